@@ -68,26 +68,28 @@ void LocalizationFilter::end_scale() {
   scale_at_.reset();
 }
 
-/// The state's scale follows, and what the covariance holds along the scale before, it holds along that after.
+/// The state's scale follows, and what the covariance holds along the scale before, it holds along that after. An
+/// update by which the world would be less than half as large is far from linear: the scale follows to a half alone.
 void LocalizationFilter::count_scale() {
-  const double eps = delta_[*scale_at_];
+  constexpr double smallest = -0.5;
+  const double eps = delta_[*scale_at_], scale = 1.0 + std::max(eps, smallest);
   const WorldTurn turn(motion_.world_from_cam, delta_.segment<3>(3));
   Eigen::VectorXd& u = next_;
   u.head(P_.dim()).setZero();
   const auto move = [&](const Eigen::Vector3d& place, int offset) {
     const Eigen::Vector3d error = delta_.segment<3>(offset);
     const Eigen::Vector3d moved = turns_world_ ? (turn.place_before(place, error) - place).eval() : error;
-    const Eigen::Vector3d grown = eps * (moved - eps * place);
-    u.segment<3>(offset) = moved + grown;
-    delta_.segment<3>(offset) += grown;
+    u.segment<3>(offset) = scale * (place + moved - eps * place) - place;
+    delta_.segment<3>(offset) += u.segment<3>(offset) - moved;
   };
   move(motion_.world_from_cam.translation, 0);
   move(motion_.velocity_in_world, 6);
   for (const Feature& feature : features_) {
     move(feature.values.head<3>(), feature.offset);
     if (feature.kind == FeatureKind::xyz) continue;
+    const double rho = feature.values[5];
     double& error = delta_[feature.offset + 5];
-    error /= 1.0 + eps;
+    error = (rho + error + rho * eps) / scale - rho;
     u[feature.offset + 5] = -error;
   }
   P_.shear_along(*scale_at_, u.data());

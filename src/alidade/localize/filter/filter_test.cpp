@@ -201,6 +201,40 @@ TEST(LocalizationFilter, ExpectsWhatItThenSees) {
   EXPECT_FALSE(filter.expected(12345));
 }
 
+/// Known points that look twice as far apart as expected are, by one linear step, at no distance at all: the world's
+/// scale would be zero, and inverse depths infinite.
+TEST(LocalizationFilter, AWorldThatShrinksToNothingLeavesNumbers) {
+  const Camera camera = underwater_camera();
+  LocalizationFilterConfig config;
+  config.max_iterations = 1;
+  config.gate = 1e12;
+  config.finds_consensus = config.is_sequential = false;
+  config.sigma_px = 0.01;
+  int num_scaled = 0;
+  for (const double apart : {1.9, 1.99, 2.0, 2.01, 2.2}) {
+    MotionMatrix cov = 1e-8 * MotionMatrix::Identity();
+    cov(2, 2) = 0.09 * 0.09;  // along the axis, of a metre
+    LocalizationFilter filter(camera, {}, cov, config);
+    std::vector<FeatureObservation> seen;
+    for (long id = 1; id <= 4; ++id) {
+      const Eigen::Vector3d point((id % 2) * 0.1 - 0.05, (id / 3) * 0.1 - 0.05, 1.0);
+      filter.add_known(id, point, 1e-6);
+      const Eigen::Vector3d nearer(apart * point.x(), apart * point.y(), 1.0);
+      seen.push_back({id, *project(camera, nearer), 0.0});
+    }
+    ASSERT_TRUE(filter.add(9, {400.0, 300.0}, {1.2, 0.05}));
+    const auto report = filter.update(seen);
+    num_scaled += report.is_sound && filter.motion().world_from_cam.translation.z() > 0.5;
+    EXPECT_TRUE(filter.motion().world_from_cam.translation.allFinite());
+    EXPECT_TRUE(covariance_of(filter).allFinite());
+    for (const Feature& feature : filter.features()) {
+      EXPECT_TRUE(feature.values.allFinite()) << apart;
+      EXPECT_LT(feature.values.cwiseAbs().maxCoeff(), 100.0) << apart;
+    }
+  }
+  EXPECT_GT(num_scaled, 0);  // else nothing of this was tried
+}
+
 TEST(LocalizationFilter, RefusesWhatItCannotHold) {
   const auto sample = testing::underwater_sample(scene_of(8, 2), 9);
   LocalizationFilterConfig config;

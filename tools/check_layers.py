@@ -7,7 +7,7 @@ import sys
 
 FOUNDATIONS = {"geometry", "estimation", "description"}
 VISION = {"imaging", "corners", "board_detector", "spot", "patches", "target", "matching"}  # measurements in an image
-SENSORS = {"camera", "pantilt", "beam", "board"} | VISION
+SENSORS = {"camera", "pantilt", "beam", "board", "imu"} | VISION
 ESTIMATORS = {"calibrate", "localize", "network", "observe", "rangefinder", "rig", "servo", "track", "turned"}
 COMPOSITIONS = {"capture", "fleet", "loop", "study"}  # put estimators and the simulator together
 JOBS = FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"}
@@ -21,6 +21,7 @@ MAY_INCLUDE = {
     "pantilt": FOUNDATIONS | {"camera", "board"},
     "board": FOUNDATIONS | {"camera"},
     "beam": FOUNDATIONS | {"camera", "board"},
+    "imu": FOUNDATIONS,
     "imaging": FOUNDATIONS | {"camera", "board"},
     "corners": FOUNDATIONS | {"imaging"},
     "board_detector": FOUNDATIONS | {"camera", "board", "imaging", "corners"},

@@ -28,7 +28,8 @@ namespace {
 
 struct LocalizeArgs {
   std::filesystem::path sequence;
-  std::string camera, target, start, truth, depth_sensor, range, beam, odometry, mask, map;  // files
+  std::string camera, target, start, truth, depth_sensor, range, beam, odometry, imu, imu_mounting, mask, map;  // files
+  Imu imu_values;  ///< Of what `imu` reads.
   std::optional<double> rate_hz;
   bool skip_bad = false;
   std::vector<SkippedInput> skipped;  ///< Of the sensors' files.
@@ -39,6 +40,39 @@ struct LocalizeArgs {
   [[nodiscard]] bool is_mask_file() const { return !mask.empty() && mask != "circle" && mask != "auto"; }
   [[nodiscard]] bool is_images() const { return !is_input() && is_image_sequence(sequence); }
 };
+
+/// What is known of an IMU's errors.
+FieldList fields_of(Imu& imu) {
+  constexpr Limits positive{.min = 0.0, .is_above_min = true};
+  ImuNoise& noise = imu.noise;
+  return {
+      {.name = "gyro_noise",
+       .value = &noise.rate_density,
+       .help = "Of --imu: density of the noise of its rates [rad/s/√Hz]",
+       .limits = positive},
+      {.name = "accelerometer_noise",
+       .value = &noise.force_density,
+       .help = "Of its forces [m/s²/√Hz]",
+       .limits = positive},
+      {.name = "gyro_walk",
+       .value = &noise.rate_walk,
+       .help = "Of the random walk of the bias of its rates [rad/s²/√Hz]",
+       .limits = positive},
+      {.name = "accelerometer_walk",
+       .value = &noise.force_walk,
+       .help = "Of the bias of its forces [m/s³/√Hz]",
+       .limits = positive},
+      {.name = "sigma_accelerometer_scale",
+       .value = &noise.sigma_force_scale,
+       .help = "σ of the scale factor that all its forces share (0.003: 0.3 %)",
+       .limits = positive},
+      {.name = "gravity_m_s2",
+       .value = &imu.gravity_m_s2,
+       .help = "Size of gravity, to 0.02 m/s²",
+       .limits = {9.7, 9.9},
+       .option = "--gravity"},
+  };
+}
 
 FieldList fields_of(LocalizeArgs& args) {
   FieldList fields = {
@@ -90,6 +124,18 @@ FieldList fields_of(LocalizeArgs& args) {
            "Where a vehicle's odometry says that it is, CSV: t_s,x_m,y_m[,z_m], in a frame of its own: metres by the "
            "lengths of its ways without a target, else a check of its scale",
        .form = "FILE"},
+      {.name = "imu",
+       .value = &args.imu,
+       .help =
+           "Readings of an inertial measurement unit fixed to the camera, CSV: t_s,omega_x_rad_s,omega_y_rad_s,"
+           "omega_z_rad_s,force_x_m_s2,force_y_m_s2,force_z_m_s2 (at rest +9.81 upwards), in its own axes: metres and "
+           "the direction of gravity without a target, else a check of its scale",
+       .form = "FILE"},
+      {.name = "imu_mounting",
+       .value = &args.imu_mounting,
+       .help = "How it is fixed to the camera, cam_from_imu: translation_m and quaternion_wxyz, or Kalibr's T_cam_imu "
+               "(default: its rotation is found by the motion, its position within 0.1 m)",
+       .form = "FILE"},
       {.name = "truth",
        .value = &args.truth,
        .help = "True path as TUM (t x y z qx qy qz qw); adds ATE and RPE",
@@ -101,6 +147,8 @@ FieldList fields_of(LocalizeArgs& args) {
   };
   const FieldList config = alidade::fields_of(args.config);
   fields.insert(fields.end(), config.begin(), config.end());
+  const FieldList imu = fields_of(args.imu_values);
+  fields.insert(fields.end(), imu.begin(), imu.end());
   fields.push_back(
       {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip rows that are wrong, by name, instead of stopping"});
   return fields;
@@ -131,6 +179,12 @@ void read_values(LocalizeArgs& args) {
     args.config.depth_readings = read_depth_sensor(args.depth_sensor, args.skip_bad, &args.skipped);
   if (!args.odometry.empty())
     args.config.odometry_readings = read_odometry(args.odometry, args.skip_bad, &args.skipped);
+  if (args.imu.empty() && !args.imu_mounting.empty()) throw UsageError("--imu-mounting needs --imu");
+  if (!args.imu.empty()) {
+    args.config.imu = args.imu_values;
+    args.config.imu->readings = read_imu(args.imu, args.skip_bad, &args.skipped);
+    if (!args.imu_mounting.empty()) args.config.imu->mounting = read_imu_mounting(args.imu_mounting);
+  }
   if (!args.range.empty()) args.config.range_readings = read_ranges(args.range, args.skip_bad, &args.skipped);
   if (!args.mask.empty() && !args.is_images())
     throw UsageError("--mask is of images; a table of observations has none");
@@ -152,6 +206,8 @@ void add_inputs(const LocalizeArgs& args, Run& run) {
   if (!args.range.empty()) run.add_input("range", args.range);
   if (!args.beam.empty()) run.add_input("beam", args.beam);
   if (!args.odometry.empty()) run.add_input("odometry", args.odometry);
+  if (!args.imu.empty()) run.add_input("IMU", args.imu);
+  if (!args.imu_mounting.empty()) run.add_input("IMU mounting", args.imu_mounting);
   if (!args.truth.empty()) run.add_input("truth", args.truth);
 }
 
@@ -261,7 +317,8 @@ void add_localize(App& app) {
                    "alidade localize later/ --camera camera.yaml --map alidade-out/localize/map.yaml --rate 30\n"
                    "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"
                    "alidade localize sights.csv --camera camera.yaml --depth-sensor depth.csv\n"
-                   "alidade localize sights.csv --camera camera.yaml --range ranges.csv --beam rangefinder.yaml\n"},
+                   "alidade localize sights.csv --camera camera.yaml --range ranges.csv --beam rangefinder.yaml\n"
+                   "alidade localize sights.csv --camera camera.yaml --imu imu.csv --imu-mounting imu.yaml\n"},
       [args](Run& run) { return run_localize(*args, run); });
   command
       .add_option(

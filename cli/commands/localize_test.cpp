@@ -359,5 +359,22 @@ TEST_F(LocalizeCommand, BeginsInTheMapOfAnEarlierRun) {
   EXPECT_EQ(localize(in_map).code, 3);
 }
 
+TEST_F(LocalizeCommand, AnImuGivesMetresWithoutATarget) {
+  simulate({"--frames", "240", "--points", "40", "--rate", "30", "--imu", "200"});
+  const std::vector<std::string> imu{"--imu",   path("sim/imu.csv"),   "--imu-mounting", path("sim/imu.yaml"),
+                                     "--truth", path("sim/truth.tum"), "--json"};
+  const Outcome outcome = localize(imu);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  EXPECT_EQ(document["estimate"]["scale_known"], true);
+  EXPECT_EQ(document["estimate"]["imu"]["used"], true);
+  EXPECT_EQ(document["estimate"]["imu"]["gravity_in_world_m_s2"].size(), 3u);
+  EXPECT_GT(document["stddev"]["imu"]["scale"], 0.0);
+  EXPECT_EQ(document["estimate"]["alignment"], "SE(3)");
+  EXPECT_LT(document["estimate"]["ate_m"], 0.01);
+  EXPECT_EQ(localize({"--imu-mounting", path("sim/imu.yaml")}).code, 2);
+  EXPECT_EQ(localize({"--imu", path("sim/target.yaml")}).code, 3);
+}
+
 }  // namespace
 }  // namespace alidade

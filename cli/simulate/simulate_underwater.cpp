@@ -7,6 +7,7 @@
 #include "alidade/formats/camera_file.h"
 #include "alidade/imaging/image_codecs.h"
 #include "alidade/simulate/films/underwater_video.h"
+#include "alidade/simulate/imu/imu_readings.h"
 #include "alidade/simulate/underwater.h"
 #include "alidade/tables/localize_file.h"
 #include "cli/app/app.h"
@@ -23,6 +24,8 @@ struct SimulateUnderwaterArgs {
   double given_f = 1.0, given_centre_px = 0.0;
   bool given_k1 = true;
   bool video = false;
+  double imu_hz = 0.0;  ///< 0: no IMU.
+  ImuScene imu;
   UnderwaterVideoConfig look;
 };
 
@@ -73,6 +76,27 @@ std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera,
   return sequence.frames.size();
 }
 
+/// An IMU's readings from half a second before the first frame to half a second after the last, with their truth.
+void add_imu(const SimulateUnderwaterArgs& args, const UnderwaterSequence& sequence, Run& run) {
+  ImuScene scene = args.imu;
+  scene.rate_hz = args.imu_hz;
+  constexpr double around_s = 0.5;
+  const ImuSequence imu = simulate_imu(scene, sequence.world_from_cam, -around_s, sequence.frames.back().t_s + around_s,
+                                       run.options.seed + 1000003);
+  run.add_file("imu.csv", imu_csv(imu.readings));
+  run.add_file("imu.yaml", imu_mounting_text(scene.mounting));
+  std::string truth =
+      "t_s,rate_bias_x,rate_bias_y,rate_bias_z,force_bias_x,force_bias_y,force_bias_z,gravity_x,"
+      "gravity_y,gravity_z,late_s\n";
+  for (const std::size_t i : {std::size_t{0}, imu.readings.size() - 1}) {
+    truth += fmt::format("{:.9g}", imu.readings[i].t_s);
+    for (const Eigen::Vector3d& each : {imu.rate_bias[i], imu.force_bias[i], scene.gravity_in_world})
+      truth += fmt::format(",{:.9g},{:.9g},{:.9g}", each.x(), each.y(), each.z());
+    truth += fmt::format(",{:.9g}\n", scene.late_s);
+  }
+  run.add_file("truth_imu.csv", truth);
+}
+
 /// The camera as given in camera.yaml.
 Camera given_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
   Camera given = camera;
@@ -102,6 +126,7 @@ ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   const std::size_t num =
       args.video ? add_frames(args, scene.camera, sequence, run) : add_observations(scene, sequence, run);
   run.add_file("camera.yaml", camera_text(given_camera(args, scene.camera), CameraFormat::alidade));
+  if (args.imu_hz > 0.0) add_imu(args, sequence, run);
   run.add_file("truth.tum", tum_text(truth));
   run.add_file("truth_map.csv", map_csv(map));
   run.document.estimate["frames"] = sequence.frames.size();
@@ -149,6 +174,9 @@ void add_underwater_scenario(App& app) {
   number("--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
   number("--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
       ->excludes(video);
+  number("--imu", args->imu_hz, "An IMU beside the camera, so many readings a second: imu.csv, its mounting imu.yaml",
+         10.0, 10000.0);
+  number("--imu-late", args->imu.late_s, "Its clock less the camera's [s]", -10.0, 10.0);
   number("--mismatches", scene.mismatches, "Share of the observations that show another point", 0.0, 1.0)
       ->excludes(video);
   number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);

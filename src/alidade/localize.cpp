@@ -108,6 +108,7 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
       result.is_scale_read = result.scale_known = true;
     }
   }
+  add_imu_scale(run.config, result);
   result.saved_map.is_in_metres = result.scale_known;
   if (run.of_images)
     run.of_images->save_map(result);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "alidade/geometry/rigid3.h"
+#include "alidade/geometry/so3_jacobian.h"
 #include "alidade/public.h"
 
 namespace alidade {
@@ -36,10 +37,6 @@ struct MotionJacobians {
 
 /// Motion ⊞ error: the nominal one moved by 12 components.
 [[nodiscard]] CameraMotion retract(const CameraMotion& motion, const Eigen::Vector<double, motion_dim>& error);
-
-/// J_r with exp(φ + ε) ≈ exp(φ) exp(J_r ε): I − (1 − cos θ)/θ² [φ]× + (θ − sin θ)/θ³ [φ]×².
-/// Solà, Deray & Atchuthan, "A micro Lie theory", 2018, eq. (143).
-[[nodiscard]] Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& phi);
 
 ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -10,6 +10,7 @@
 
 #include "alidade/beam/beam.h"
 #include "alidade/description/field.h"
+#include "alidade/imu/imu.h"
 #include "alidade/localize/camera_motion.h"
 #include "alidade/localize/distortion.h"
 #include "alidade/localize/saved_map.h"
@@ -137,6 +138,7 @@ struct LocalizeConfig {
   std::optional<Beam> beam = {};
   std::vector<OdometryReading> odometry_readings = {};  ///< The same, by the lengths of its ways.
   double sigma_odometry = 0.01;  ///< Of a length, relative: what all of them share, as a wheel's radius.
+  std::optional<Imu> imu = {};   ///< Scale without a target, else a check of it; the smoothed path heeds it.
   std::optional<ImageMask> mask = {};
   bool masks_circle = false;  ///< Images show the scene in a circle, as an endoscope's: found in the first that does.
   bool masks_still = false;   ///< What never moves while the scene does is found on the way and not looked at.

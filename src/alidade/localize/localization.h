@@ -10,6 +10,7 @@
 #include "alidade/camera/camera.h"
 #include "alidade/estimation/counts.h"
 #include "alidade/estimation/verdict.h"
+#include "alidade/localize/imu/imu_estimate.h"
 #include "alidade/localize/saved_map.h"
 #include "alidade/localize/sequence.h"
 #include "alidade/public.h"
@@ -65,7 +66,7 @@ struct GivenNumber {
 
 /// What a sensor beside the camera says of the path's unit of length.
 struct SensorScale {
-  std::string sensor;      ///< "depth sensor", "rangefinder", "odometry"
+  std::string sensor;      ///< "depth sensor", "rangefinder", "odometry", "IMU"
   double scale = 1.0;      ///< Metres for each unit that the path had without it: 1 where a target is right.
   double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
@@ -114,6 +115,7 @@ struct Localization {
   bool scale_known = false;
   bool is_scale_read = false;              ///< Known by `sensor_scales`, and not by a target.
   std::vector<SensorScale> sensor_scales;  ///< Of what readings there were.
+  std::optional<ImuEstimate> imu;          ///< Where one was given.
   bool has_target = false;                 ///< Known points were given,
   bool is_in_map = false;                  ///< as a map that was saved.
   bool is_of_images = false;

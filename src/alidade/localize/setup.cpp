@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "alidade/estimation/config_error.h"
@@ -130,6 +131,30 @@ void add_faults(const LocalizeStart& start, Sentences& found) {
   }
 }
 
+void add_faults(const Imu& imu, Sentences& found) {
+  double last_t_s = -std::numeric_limits<double>::infinity();
+  for (const ImuReading& reading : imu.readings) {
+    if (!(reading.t_s > last_t_s) || !reading.rate_rad_s.allFinite() || !reading.force_m_s2.allFinite()) {
+      found.emplace_back("a reading of the IMU is not finite, or not after the one before it");
+      break;
+    }
+    last_t_s = reading.t_s;
+  }
+  const ImuNoise& noise = imu.noise;
+  for (const double sigma :
+       {noise.rate_density, noise.force_density, noise.rate_walk, noise.force_walk, noise.sigma_rate_bias,
+        noise.sigma_force_bias, noise.sigma_force_scale, imu.gravity_m_s2, imu.sigma_gravity_m_s2})
+    if (!(sigma > 0.0) || !std::isfinite(sigma)) {
+      found.emplace_back("gravity, a density of the IMU's noise or a sigma of it is not above 0");
+      break;
+    }
+  if (!imu.mounting) return;
+  const Rigid3& pose = imu.mounting->cam_from_imu;
+  if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1.0) < 1e-3) ||
+      !(imu.mounting->sigma_rotation_rad > 0.0) || !(imu.mounting->sigma_position_m > 0.0))
+    found.emplace_back("the mounting of the IMU is none");
+}
+
 /// Of the lens's parameters that are estimated: which there are.
 void add_lens_faults(const LocalizationFilterConfig& filter, const Camera& camera, Sentences& found) {
   const std::vector<int>& indices = filter.lens_params;
@@ -211,6 +236,7 @@ void require_sense(const LocalizeConfig& config, const Camera& camera) {
       found.emplace_back("an odometry reading is not finite");
       break;
     }
+  if (config.imu) add_faults(*config.imu, found);
   for (const RangeReading& reading : config.range_readings)
     if (!std::isfinite(reading.t_s) || !(reading.range_m > 0.0) || !std::isfinite(reading.range_m)) {
       found.emplace_back("a range reading is not finite and above 0");

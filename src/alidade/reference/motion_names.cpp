@@ -192,6 +192,21 @@ tested[].
   asked  1     its size
   sigma  1     σ
   z      1     size over σ
+imu.
+  used                            flag   whether the path was solved with it
+  gravity_in_world_m_s2[3]        m/s2   gravity in the path's frame
+  gyro_bias_rad_s[3]              rad/s  of its rates, at the end, in its axes
+  accelerometer_bias_m_s2[3]      m/s2   of its forces, at the end, in its axes
+  imu_in_cam_m[3]                 m      its place in the camera
+  cam_from_imu_quaternion_wxyz[4]  1      its rotation
+  cam_from_imu_rad[3]             rad    under stddev: σ of the rotation
+  clock_s                         s      its clock less the camera's
+  scale                           1      metres per unit of the path without it; with a target path over target
+  gyro_noise_factor               1      σ of its rates over the given one
+  accelerometer_noise_factor      1      σ of its forces over the given one
+  steps                           count  from frame to frame, used
+  steps_rejected                  count  rejected
+  steps_missing                   count  without readings
 *             any    of a part that was asked for
 data:
 path.

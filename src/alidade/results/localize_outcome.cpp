@@ -144,6 +144,39 @@ void fill_path_estimate(const Localization& result, ResultDocument& document) {
   document.data.push_back(features_table(result));
 }
 
+JsonValue list_of(const Eigen::Vector3d& v) {
+  JsonValue list = JsonValue::list();
+  for (const double each : {v.x(), v.y(), v.z()}) list.push_back(each);
+  return list;
+}
+
+void fill_imu(const ImuEstimate& imu, ResultDocument& document) {
+  JsonValue &estimate = document.estimate["imu"], &stddev = document.stddev["imu"];
+  estimate["used"] = imu.fault == ImuFault::none;
+  if (imu.fault != ImuFault::none) return;
+  const auto add = [&](const char* name, const Eigen::Vector3d& value, const Eigen::Vector3d& sigma) {
+    estimate[name] = list_of(value);
+    stddev[name] = list_of(sigma);
+  };
+  add("gravity_in_world_m_s2", imu.gravity_in_world, imu.sigma_gravity);
+  add("gyro_bias_rad_s", imu.rate_bias, imu.sigma_rate_bias);
+  add("accelerometer_bias_m_s2", imu.force_bias, imu.sigma_force_bias);
+  add("imu_in_cam_m", imu.cam_from_imu.translation, imu.sigma_position_m);
+  const Eigen::Quaterniond& q = imu.cam_from_imu.rotation;
+  estimate["cam_from_imu_quaternion_wxyz"] = JsonValue::list();
+  for (const double each : {q.w(), q.x(), q.y(), q.z()}) estimate["cam_from_imu_quaternion_wxyz"].push_back(each);
+  stddev["cam_from_imu_rad"] = list_of(imu.sigma_rotation_rad);
+  estimate["clock_s"] = imu.late_s;
+  stddev["clock_s"] = imu.sigma_late_s;
+  estimate["scale"] = imu.scale;
+  stddev["scale"] = imu.scale * imu.sigma_scale;
+  estimate["gyro_noise_factor"] = imu.rate_noise_factor;
+  estimate["accelerometer_noise_factor"] = imu.force_noise_factor;
+  estimate["steps"] = imu.num_steps;
+  estimate["steps_rejected"] = imu.num_rejected;
+  estimate["steps_missing"] = imu.num_missing;
+}
+
 void path_lines(const Localization& result, std::vector<std::string>& lines) {
   if (result.path.empty() || !result.path.back().has_pose()) return;
   const PathStep& last = result.path.back();
@@ -158,6 +191,10 @@ void path_lines(const Localization& result, std::vector<std::string>& lines) {
                                 result.smoothed_every));
   if (result.num_loops > 0)
     lines.push_back(fmt::format("{} loops closed: what was seen long before is seen again", result.num_loops));
+  if (result.imu && result.imu->fault == ImuFault::none)
+    lines.push_back(fmt::format("IMU: {} steps, {} rejected; scale ± {:.2g} % (3σ), clock {:.4f} ± {:.4f} s",
+                                result.imu->num_steps, result.imu->num_rejected, 300.0 * result.imu->sigma_scale,
+                                result.imu->late_s, 3.0 * result.imu->sigma_late_s));
   if (std::isfinite(result.error.ate_m))
     lines.push_back(fmt::format("against the truth: ATE {:.4g} m ({} alignment), RPE {:.4g} m a frame",
                                 result.error.ate_m, result.scale_known ? "SE(3)" : "Sim(3)", result.error.rpe_m));
@@ -196,6 +233,7 @@ JobOutcome outcome_of(const Localization& localization) {
   document.assumed = localization.assumed;
   document.verdict = localization.verdict;
   fill_path_estimate(localization, document);
+  if (localization.imu) fill_imu(*localization.imu, document);
   path_lines(localization, outcome.lines);
   add_path_files(localization, outcome.files);
   return outcome;

@@ -92,6 +92,7 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
   Draws draws(seed);
   const Swing swing = swing_of(draws);
   UnderwaterSequence sequence;
+  sequence.world_from_cam = [swing](double t_s) { return swing.world_from_cam(t_s); };
   sequence.points = points_of(scene, draws);
   const Eigen::Vector3d turn = scene.sigma_rotation_rad * draws.normal3();
   const Rigid3 first = swing.world_from_cam(0.0);

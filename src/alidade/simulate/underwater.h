@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -58,6 +59,7 @@ struct UnderwaterPoint {
 };
 
 struct UnderwaterSequence {
+  std::function<Rigid3(double t_s)> world_from_cam;  ///< The truth at any time.
   std::vector<UnderwaterFrame> frames;
   std::vector<UnderwaterPoint> points;
   Rigid3 given_start;  ///< The first pose as a filter is given it.

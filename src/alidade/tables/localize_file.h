@@ -48,6 +48,14 @@ struct ObservationsOptions {
 [[nodiscard]] std::vector<OdometryReading> read_odometry(const std::filesystem::path& file, bool skip_bad = false,
                                                          std::vector<SkippedInput>* skipped = nullptr);
 
+/// Reads `t_s,omega_x_rad_s,…,force_x_m_s2,…` of an IMU, in order of time. Throws InputError.
+[[nodiscard]] std::vector<ImuReading> read_imu(const std::filesystem::path& file, bool skip_bad = false,
+                                               std::vector<SkippedInput>* skipped = nullptr);
+[[nodiscard]] std::string imu_csv(std::span<const ImuReading> readings);
+/// Reads cam_from_imu: translation_m, quaternion_wxyz, or Kalibr's T_cam_imu; sigma_rotation_rad, sigma_translation_m.
+[[nodiscard]] ImuMounting read_imu_mounting(const std::filesystem::path& file);
+[[nodiscard]] std::string imu_mounting_text(const ImuMounting& mounting);
+
 /// Poses as TUM writes them, `t x y z qx qy qz qw`, in order of time; lines that begin with # are comments.
 [[nodiscard]] std::vector<TimedPose> read_tum(const std::filesystem::path& file);
 [[nodiscard]] std::string tum_text(std::span<const TimedPose> poses);

@@ -10,6 +10,11 @@ namespace alidade {
 /// Whether the path stands. A path that its observations contradict is never good.
 [[nodiscard]] Verdict localize_verdict(const Localization& result);
 
+/// Why an IMU's readings have no part in the path; empty where they have.
+[[nodiscard]] std::string imu_fault_text(const ImuEstimate& imu);
+/// Checks of those that have.
+void add_imu(const Localization& report, Verdict& verdict);
+
 /// Of a lens that the observations contradict, what of it is not as it was given: "focal length +2.1 % (12σ), centre u
 /// -3 px (8σ), k1 -0.02 (20σ)".
 [[nodiscard]] std::string lens_changes(const Localization& result);

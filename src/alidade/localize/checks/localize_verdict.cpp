@@ -235,6 +235,10 @@ void add_sensors(const Localization& report, Verdict& verdict) {
   const SensorScale* first = nullptr;
   for (const SensorScale& each : report.sensor_scales) {
     if (!(each.sigma_rel > 0.0)) {
+      if (each.sensor == "IMU") {
+        verdict.checks.push_back({each.sensor, State::care, imu_fault_text(*report.imu), 0.0, 0.0, "", "path"});
+        continue;
+      }
       verdict.checks.push_back({each.sensor, State::care,
                                 "the readings of the " + each.sensor + " do not determine the scale: " +
                                     (!each.is_in_time            ? "none of them is of the time of the path (t_s)"
@@ -320,6 +324,7 @@ void add_checks(const Localization& report, Verdict& verdict) {
     verdict.checks.push_back({"restarts", restarts_state(report), restarts_text(report),
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});
   add_sensors(report, verdict);
+  add_imu(report, verdict);
   add_given(report, verdict);
   add_radial(report, verdict);
   add_residuals(report, verdict);

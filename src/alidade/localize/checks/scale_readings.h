@@ -43,6 +43,8 @@ struct ReadScale {
 
 /// What each of the config's sensors says of `result.path`, into `result.sensor_scales`.
 void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result);
+/// What an IMU said of it when the path was solved, into the same.
+void add_imu_scale(const LocalizeConfig& config, Localization& result);
 /// All of them together, the surer one counting for more. None: nothing determines it.
 [[nodiscard]] std::optional<ReadScale> scale_of(const Localization& result);
 

@@ -87,6 +87,15 @@ void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Lo
         scale_by_odometry(config.odometry_readings, config.sigma_odometry, result.path));
 }
 
+void add_imu_scale(const LocalizeConfig& config, Localization& result) {
+  if (!config.imu) return;
+  if (!result.imu) result.imu = ImuEstimate{.fault = ImuFault::unsettled};
+  const ImuEstimate& imu = *result.imu;
+  const bool is_used = imu.fault == ImuFault::none;
+  result.sensor_scales.push_back({"IMU", is_used ? imu.scale : 1.0, is_used ? imu.sigma_scale : 0.0, imu.num_steps,
+                                  imu.num_rejected, imu.fault != ImuFault::other_time});
+}
+
 std::optional<ReadScale> scale_of(const Localization& result) {
   double weights = 0.0, logs = 0.0;
   ReadScale all;

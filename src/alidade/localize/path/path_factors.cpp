@@ -208,6 +208,8 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
       given << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
       variance = problem_.start->cov.diagonal().tail<6>();
     }
+    constexpr double any_m_s = 5.0;  // an IMU's path is in metres; what was supposed of its speed is not
+    if (problem_.imu) variance.head<3>().array() += any_m_s * any_m_s;
     J.leftCols<6>() = first.J_from;
     J.middleCols<6>(6) = first.J_to;
     add_window(J, first.values - given, variance + walked_before(steps(k)) * step_variance, system);
@@ -218,8 +220,14 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
   J.middleCols<6>(6) = second.J_from - first.J_to;
   J.rightCols<6>() = second.J_to;
   const double num_steps = walked_before(steps(k + 1)) + walked_after(steps(k));
-  add_acceleration(surroundings(state, k, system.chain), J, second.values - first.values, num_steps * step_variance,
-                   system);
+  Eigen::Vector<double, 6> change = second.values - first.values;
+  const auto is_measured = [&](Eigen::Index row) {
+    J.middleRows<3>(row).setZero();
+    change.segment<3>(row).setZero();
+  };
+  if (uses_forces(k)) is_measured(0);
+  if (uses_rates(k) && uses_rates(k + 1)) is_measured(3);
+  add_acceleration(surroundings(state, k, system.chain), J, change, num_steps * step_variance, system);
 }
 
 void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system) const {
@@ -237,9 +245,10 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
 }
 
 std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared) const {
-  SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_estimated_, max_at_once_)};
+  SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_solved(), max_at_once_)};
   system.has_given = shared == Shared::all;
   add_given_lens(state, system);
+  add_given_imu(state, system);
   add_start(state, system);
   std::vector<std::vector<std::size_t>> first_seen(state.poses.size());
   for (std::size_t i = 0; i < problem_.points.size(); ++i)
@@ -253,6 +262,7 @@ std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Sh
     if (!add_observations(state, k, rows, system)) return std::nullopt;
     for (const std::size_t point : first_seen[k]) add_range(state, point, system);
     if (k + 1 < state.poses.size()) add_motion(state, k, system);
+    add_imu(state, k, system);
     if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_given;
     if (fixed_ && fixed_->frame == k) add_fixed(state, system);
     if (!system.chain.eliminate()) return std::nullopt;

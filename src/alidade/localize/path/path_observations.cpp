@@ -67,25 +67,26 @@ using Rows6 = Eigen::Matrix<double, 2, 6>;
 /// Terms of a pose of the window with itself, the point and what is shared. Products of two rows: Eigen's general ones
 /// cost more than they do.
 template <typename Shared>
-void add_pose(int row, const Rows6& J, const Eigen::Matrix<double, 2, 3>& J_point, const Shared& J_shared, int at,
-              const Eigen::Vector2d& error, PoseChain& chain) {
+void add_pose(int row, const Rows6& J, const Eigen::Matrix<double, 2, 3>& J_point, const Shared& J_shared,
+              Eigen::Index shared_at, int at, const Eigen::Vector2d& error, PoseChain& chain) {
   chain.A.block<6, 6>(row, row) += J.transpose() * J;
   chain.U.block<6, 3>(row, at) += J.transpose() * J_point;
   for (Eigen::Index i = 0; i < J_shared.cols(); ++i)
-    chain.U.block<6, 1>(row, i) += J.transpose() * Eigen::Vector2d(J_shared.col(i));
+    chain.U.block<6, 1>(row, shared_at + i) += J.transpose() * Eigen::Vector2d(J_shared.col(i));
   chain.a.segment<6>(row) -= J.transpose() * error;
 }
 
 template <typename Shared>
-void add_point(const Eigen::Matrix<double, 2, 3>& J, const Shared& J_shared, int at, const Eigen::Vector2d& error,
-               PoseChain& chain) {
+void add_point(const Eigen::Matrix<double, 2, 3>& J, const Shared& J_shared, Eigen::Index shared_at, int at,
+               const Eigen::Vector2d& error, PoseChain& chain) {
   chain.B.block<3, 3>(at, at) += J.transpose() * J;
   chain.b.segment<3>(at) -= J.transpose() * error;
   for (Eigen::Index i = 0; i < J_shared.cols(); ++i) {
     const Eigen::Vector2d column = J_shared.col(i);
-    chain.B.block<3, 1>(at, i) += J.transpose() * column;
-    for (Eigen::Index j = i; j < J_shared.cols(); ++j) chain.B(j, i) += column.dot(J_shared.col(j));
-    chain.b[i] -= column.dot(error);
+    chain.B.block<3, 1>(at, shared_at + i) += J.transpose() * column;
+    for (Eigen::Index j = i; j < J_shared.cols(); ++j)
+      chain.B(shared_at + j, shared_at + i) += column.dot(J_shared.col(j));
+    chain.b[shared_at + i] -= column.dot(error);
   }
 }
 
@@ -101,11 +102,11 @@ void PathSmoother::add(const ObservationRows& rows, const ObservationRows* befor
     now.J_point -= share * before->J_point;
     now.J_shared -= share * before->J_shared;
     const Rows6 J_before = -share * before->J_pose;
-    add_pose(0, J_before, now.J_point, now.J_shared, at, now.error, chain);
+    add_pose(0, J_before, now.J_point, now.J_shared, lens_at_, at, now.error, chain);
     chain.A.block<6, 6>(row, 0) += now.J_pose.transpose() * J_before;
   }
-  add_pose(row, now.J_pose, now.J_point, now.J_shared, at, now.error, chain);
-  add_point(now.J_point, now.J_shared, at, now.error, chain);
+  add_pose(row, now.J_pose, now.J_point, now.J_shared, lens_at_, at, now.error, chain);
+  add_point(now.J_point, now.J_shared, lens_at_, at, now.error, chain);
   system.cost += now.error.squaredNorm();
   system.observed_cost += now.error.squaredNorm();
 }

@@ -12,6 +12,7 @@
 namespace alidade {
 
 PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
+  if (problem.imu) lens_at_ = problem.imu->start.dim();
   estimate_lens(problem.filter.lens_params);
   sigma_estimated_ = problem.filter.sigma_lens_params;
   causes_at_ = lens_at_ + static_cast<int>(lens_order_.size());
@@ -28,6 +29,7 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
   state_.camera = problem.camera;
   state_.poses = problem.world_from_cam;
   given_lens_ = params(problem.camera.lens);
+  begin_imu();
 }
 
 /// A point is there from its first observation, or where its distance was believed, to its last.
@@ -75,6 +77,7 @@ SmootherState PathSmoother::moved_by(const Eigen::VectorXd& shared, const PoseCh
   for (int i = 0; i < num_estimated_; ++i)
     lens[lens_order_[static_cast<std::size_t>(i)]] += share * shared[lens_at_ + i];
   moved.camera.lens = with_params(moved.camera.lens, lens);
+  if (problem_.imu) moved.imu = state_.imu.moved(share * shared.head(lens_at_));
   return moved;
 }
 
@@ -132,8 +135,11 @@ bool PathSmoother::settle_all() {
   constexpr double roughly = 0.3;
   if (!settle(roughly)) return false;
   constexpr int max_choices = 3;
-  for (int i = 0; i < max_choices && choose_observations(); ++i)
+  for (int i = 0; i < max_choices; ++i) {
+    const bool has_others = choose_observations(), has_other_steps = choose_steps();
+    if (!has_others && !has_other_steps) break;
     if (!settle(roughly)) return false;
+  }
   return heed_colour();
 }
 
@@ -227,8 +233,9 @@ SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
   Eigen::MatrixXd cov = asked.J * considered * asked.J.transpose();
   cov.topLeftCorner(num, num) += llt.solve(Eigen::MatrixXd::Identity(num, num));
   PoseChain::Spread spread = system.chain.spread(cov, asked.J);
-  align(system, considered, spread);
   SmoothedPath path;
+  fill_imu(system, cov, asked, path);
+  align(system, considered, spread);
   path.world_from_cam = state_.poses;
   for (std::size_t k = 0; k < state_.poses.size(); ++k) {
     Eigen::Matrix<double, 6, 6> to_camera = Eigen::Matrix<double, 6, 6>::Identity();

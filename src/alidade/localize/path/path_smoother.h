@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/localize/filter/filter_bank.h"
+#include "alidade/localize/imu/imu_factors.h"
 #include "alidade/localize/localization.h"
 
 namespace alidade {
@@ -43,6 +44,26 @@ enum class PathGauge {
   similarity,  ///< Its unit of length as well.
 };
 
+/// An IMU's readings in the camera's axes and at its times, and what is known of their errors.
+struct SmootherImu {
+  std::vector<ImuReading> readings;
+  ImuNoise noise;
+  ImuState start;  ///< To begin at; its place in the camera is the given one.
+  double gravity_m_s2 = 9.81, sigma_gravity_m_s2 = 0.02;
+  double sigma_rotation_rad = 0.02, sigma_position_m = 0.01, sigma_late_s = 0.01;
+};
+
+/// What of it a path found.
+struct SmoothedImu {
+  ImuState state;
+  Eigen::VectorXd sigma;      ///< Of all its numbers.
+  double sigma_scale = 0.0;   ///< Of the path's extent, over it.
+  double target_scale = 0.0;  ///< By how much larger it asks the target to be, relative, where there is one,
+  double sigma_target = 0.0;  ///< and its σ.
+  double rate_noise_factor = 1.0, force_noise_factor = 1.0;  ///< By which σ was enlarged.
+  std::size_t num_steps = 0, num_rejected = 0, num_missing = 0;
+};
+
 /// What a path is smoothed from. Frames follow each other without a break.
 struct SmootherProblem {
   std::size_t first_frame = 0;  ///< Of the recording.
@@ -59,6 +80,7 @@ struct SmootherProblem {
   PathGauge gauge = PathGauge::fixed;
   double sigma_scale = 0.0;  ///< Of the known points' common scale, counted and not estimated.
   bool frees_lens = false;   ///< A lens that the observations contradict is estimated, without what was given of it.
+  std::optional<SmootherImu> imu;   ///< Its unit of length is then the metre.
   LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
 };
 
@@ -87,6 +109,7 @@ struct SmoothedPath {
   /// turns and small moves look alike where depths are not known, and the posterior is no Gaussian.
   bool is_from_one_place = false;
   std::size_t num_dropped = 0;  ///< Observations that do not fit it.
+  std::optional<SmoothedImu> imu;
 };
 
 /// All observations of a recording together: a filter's derivatives are those of its moment, when depths were vague,

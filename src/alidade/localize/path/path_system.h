@@ -19,6 +19,7 @@ struct SmootherState {
   Camera camera;
   std::vector<Rigid3> poses;
   std::vector<Eigen::Vector3d> points;
+  ImuState imu;
 };
 
 struct SmootherSystem {
@@ -40,8 +41,9 @@ class PathSmoother {
   using WindowRows = Eigen::Matrix<double, 6, PoseChain::window>;
 
  private:
-  /// Of the shared parameters those that are solved for: the estimated part of the lens, which stands first.
-  [[nodiscard]] int num_solved() const { return num_estimated_; }
+  /// Of the shared parameters those that are solved for, which stand first: an IMU's, then the estimated part of the
+  /// lens.
+  [[nodiscard]] int num_solved() const { return lens_at_ + num_estimated_; }
   static constexpr double well = 1e-3;
   [[nodiscard]] bool settle(double settled = well);
   enum class Shared { solved, all };  ///< What stands in the border: all only for what comes of a solution.
@@ -100,16 +102,29 @@ class PathSmoother {
                         const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const;
   void add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_start(const SmootherState& state, SmootherSystem& system) const;
-  [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& given_in_world) const;
-  /// The observations within the gate of where they are expected now. Whether these are others than before.
-  [[nodiscard]] bool choose_observations();
-  [[nodiscard]] Eigen::MatrixXd lens_information() const;
   /// What is left of the normal equations for what is given, all that is solved for at its best.
   struct Asked {
     Eigen::MatrixXd J;  ///< Of all that is shared, by what is given.
     Eigen::MatrixXd information;
     Eigen::VectorXd score;
   };
+  /// path_imu.cpp.
+  void begin_imu();
+  void leave_out_blows();
+  [[nodiscard]] bool uses_rates(std::size_t k) const { return k < rates_used_.size() && rates_used_[k]; }
+  [[nodiscard]] bool uses_forces(std::size_t k) const { return k < forces_used_.size() && forces_used_[k]; }
+  [[nodiscard]] ImuRows rates_at(const SmootherState& state, std::size_t k) const;
+  [[nodiscard]] ImuRows forces_at(const SmootherState& state, std::size_t k) const;
+  [[nodiscard]] double rates_variance(std::size_t k) const;
+  [[nodiscard]] double forces_variance(std::size_t k) const;
+  void add_imu(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
+  void add_given_imu(const SmootherState& state, SmootherSystem& system) const;
+  [[nodiscard]] bool choose_steps();
+  void fill_imu(const SmootherSystem& system, const Eigen::MatrixXd& cov, const Asked& asked, SmoothedPath& path) const;
+  [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& given_in_world) const;
+  /// The observations within the gate of where they are expected now. Whether these are others than before.
+  [[nodiscard]] bool choose_observations();
+  [[nodiscard]] Eigen::MatrixXd lens_information() const;
   [[nodiscard]] Asked asked(const SmootherSystem& system) const;
   [[nodiscard]] Eigen::MatrixXd considered_cov() const;
   void fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath& path) const;
@@ -140,7 +155,7 @@ class PathSmoother {
   std::vector<double> sigma_estimated_;
   int num_estimated_ = 0;
   bool is_lens_freed_ = false;  ///< What was given of it contradicts the observations: estimated without it.
-  static constexpr int lens_at_ = 0;
+  int lens_at_ = 0;
   int causes_at_ = 0;  ///< The target's scale and shape, its speed, and the image's readout: tested, not solved for.
   Eigen::Vector3d target_centre_ = Eigen::Vector3d::Zero();
   double mid_s_ = 0.0;
@@ -154,6 +169,9 @@ class PathSmoother {
   std::optional<FixedCombination> fixed_;
   Eigen::VectorXd given_lens_;
   SmootherState state_;
+  std::vector<std::optional<ImuStepAt>> steps_;  ///< Of an IMU, from each frame to the next.
+  std::vector<bool> rates_used_, forces_used_;   ///< Of each step; of each frame and the two after it.
+  double rate_noise_ = 1.0, force_noise_ = 1.0;  ///< By which the given variances are larger.
   /// The frames in which a point is in the equations, by its observations; none: it has no part in them.
   struct Life {
     std::size_t first = 0, last = 0;

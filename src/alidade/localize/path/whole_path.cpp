@@ -5,6 +5,7 @@
 
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
+#include "alidade/localize/imu/imu_alignment.h"
 #include "alidade/localize/path/loop_closure.h"
 #include "alidade/localize/path/remaining_points.h"
 
@@ -75,10 +76,34 @@ std::optional<SmoothedPath> smooth_with_loops(const Recording& recording, Smooth
   return smooth(problem, frames, result);
 }
 
-/// A path up to scale, once more where sensors beside the camera say how long it is: each point's distance from where
-/// it was first seen is believed to be what it is now, in metres, so vaguely that all of them together say the scale
-/// and its σ, and nothing else. What a unit was before in metres.
-double solve_in_metres(const Recording& recording, const LocalizeConfig& config, SmootherProblem problem,
+/// The problem begins where another's solution is, larger by a scale.
+void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& problem) {
+  for (std::size_t k = 0; k < problem.world_from_cam.size(); ++k) {
+    problem.world_from_cam[k] = smoothed.world_from_cam[k];
+    problem.world_from_cam[k].translation *= scale;
+  }
+  std::vector<SmootherPoint> points;
+  for (SmootherPoint& point : problem.points) {
+    const auto at = std::ranges::lower_bound(smoothed.ids, point.id);
+    if (at == smoothed.ids.end() || *at != point.id) continue;
+    point.point_in_world = scale * smoothed.points[static_cast<std::size_t>(at - smoothed.ids.begin())];
+    points.push_back(point);
+  }
+  problem.points = std::move(points);
+}
+
+/// Each point's distance from where it was first seen is believed to be what it is now, so vaguely that all of them
+/// together say the scale to `sigma_rel`, and nothing else.
+void believe_distances(double sigma_rel, SmootherProblem& problem) {
+  const double sigma_of_one = sigma_rel * std::sqrt(static_cast<double>(problem.points.size()));
+  for (SmootherPoint& point : problem.points) {
+    const Eigen::Vector3d away = point.point_in_world - problem.world_from_cam[point.first_frame].translation;
+    point.range = RangePrior{away.norm(), sigma_of_one};
+  }
+}
+
+/// A path up to scale, once more where sensors beside the camera say how long it is. What a unit was before in metres.
+double solve_in_metres(const Recording& recording, const LocalizeConfig& config, SmootherProblem& given,
                        SmoothedPath& smoothed, Localization& result) {
   if (!config.target.points.empty()) return 1.0;
   std::vector<MapPoint> map;
@@ -87,29 +112,120 @@ double solve_in_metres(const Recording& recording, const LocalizeConfig& config,
   read_scales(config, map, result);
   const auto read = scale_of(result);
   if (!read) return 1.0;
-  for (std::size_t k = 0; k < problem.world_from_cam.size(); ++k) {
-    problem.world_from_cam[k] = smoothed.world_from_cam[k];
-    problem.world_from_cam[k].translation *= read->scale;
-  }
-  const double sigma_rel = read->sigma_rel * std::sqrt(static_cast<double>(smoothed.ids.size()));
-  std::vector<SmootherPoint> points;
-  for (SmootherPoint& point : problem.points) {
-    const auto at = std::ranges::lower_bound(smoothed.ids, point.id);
-    if (at == smoothed.ids.end() || *at != point.id) continue;
-    point.point_in_world = read->scale * smoothed.points[static_cast<std::size_t>(at - smoothed.ids.begin())];
-    const Eigen::Vector3d away = point.point_in_world - problem.world_from_cam[point.first_frame].translation;
-    point.range = RangePrior{away.norm(), sigma_rel};
-    points.push_back(point);
-  }
-  problem.points = std::move(points);
+  SmootherProblem problem = given;
+  begin_at(smoothed, read->scale, problem);
+  believe_distances(read->sigma_rel, problem);
   if (problem.gauge == PathGauge::similarity) problem.gauge = PathGauge::motion;
   Localization again = result;
   auto in_metres = smooth(problem, recording.frames.frames(), again);
   if (!in_metres) return 1.0;
   result = std::move(again);
   smoothed = std::move(*in_metres);
+  given = std::move(problem);
   result.is_scale_read = result.scale_known = true;
   return read->scale;
+}
+
+std::vector<TimedPose> poses_of(const SmootherProblem& problem, const SmoothedPath& smoothed) {
+  std::vector<TimedPose> poses;
+  for (std::size_t k = 0; k < problem.t_s.size(); ++k) poses.push_back({problem.t_s[k], smoothed.world_from_cam[k]});
+  return poses;
+}
+
+/// An IMU as the smoother takes it, from its first estimate on. Its clock and rotation may still move: what they were
+/// found by is in the equations again.
+SmootherImu imu_to_solve(const Imu& given, ImuAlignment alignment, std::span<const double> t_s) {
+  constexpr double found_rotation_rad = 0.3, found_position_m = 0.1, found_late_s = 0.02;
+  constexpr double node_apart_s = 10.0, most_nodes = 9.0;
+  SmootherImu imu{.readings = std::move(alignment.readings), .noise = given.noise, .start = {}};
+  imu.gravity_m_s2 = given.gravity_m_s2;
+  imu.sigma_gravity_m_s2 = given.sigma_gravity_m_s2;
+  imu.sigma_rotation_rad = given.mounting ? given.mounting->sigma_rotation_rad : found_rotation_rad;
+  imu.sigma_position_m = given.mounting ? given.mounting->sigma_position_m : found_position_m;
+  imu.sigma_late_s = found_late_s;
+  const ImuEstimate& found = alignment.estimate;
+  const double length_s = t_s.back() - t_s.front();
+  const int num = static_cast<int>(std::clamp(std::ceil(length_s / node_apart_s), 1.0, most_nodes - 1.0)) + 1;
+  for (int i = 0; i < num; ++i) {
+    imu.start.node_t_s.push_back(t_s.front() + length_s * i / (num - 1));
+    imu.start.rate_bias.push_back(found.rate_bias);
+    imu.start.force_bias.push_back(found.force_bias);
+  }
+  imu.start.gravity_in_world = found.gravity_in_world;
+  imu.start.imu_in_cam = found.cam_from_imu.translation;
+  return imu;
+}
+
+/// What a path found of an IMU, in its own axes.
+void fill_estimate(const SmoothedImu& found, ImuEstimate& estimate) {
+  const ImuState& state = found.state;
+  const Eigen::Matrix3d imu_from_cam = estimate.cam_from_imu.rotation.conjugate().toRotationMatrix();
+  const auto in_imu = [&](int at) {
+    const Eigen::Vector3d variances = found.sigma.segment<3>(at).cwiseAbs2();
+    return Eigen::Vector3d((imu_from_cam.cwiseAbs2() * variances).cwiseSqrt());
+  };
+  const int last = state.gravity_at() - 6;
+  estimate.rate_bias = imu_from_cam * state.rate_bias.back();
+  estimate.force_bias = imu_from_cam * state.force_bias.back();
+  estimate.sigma_rate_bias = in_imu(last);
+  estimate.sigma_force_bias = in_imu(last + 3);
+  estimate.cam_from_imu = {(state.turn * estimate.cam_from_imu.rotation).normalized(), state.imu_in_cam};
+  estimate.sigma_rotation_rad = found.sigma.segment<3>(state.turn_at());
+  estimate.sigma_position_m = found.sigma.segment<3>(state.place_at());
+  estimate.gravity_in_world = state.gravity_in_world;
+  estimate.sigma_gravity = found.sigma.segment<3>(state.gravity_at());
+  estimate.late_s += state.late_s;
+  estimate.sigma_late_s = found.sigma[state.late_at()];
+  estimate.rate_noise_factor = found.rate_noise_factor;
+  estimate.force_noise_factor = found.force_noise_factor;
+  estimate.num_steps = found.num_steps;
+  estimate.num_rejected = found.num_rejected;
+  estimate.num_missing = found.num_missing;
+}
+
+/// Whether a path with an IMU is one: its scale is determined, and its noise not many times that of any.
+ImuFault fault_of(const SmoothedImu& found, bool is_in_metres) {
+  constexpr double useless = 0.2, any_noise = 30.0;
+  if (std::max(found.rate_noise_factor, found.force_noise_factor) > any_noise ||
+      2 * found.num_rejected > found.num_steps)
+    return ImuFault::misfit;
+  return is_in_metres || found.sigma_scale < useless ? ImuFault::none : ImuFault::still;
+}
+
+/// A path once more with an IMU's rates and forces. What a unit was before in metres.
+double solve_with_imu(const Recording& recording, const LocalizeConfig& config, SmootherProblem problem,
+                      SmoothedPath& smoothed, Localization& result) {
+  if (!config.imu) return 1.0;
+  ImuAlignment alignment = align_imu(*config.imu, poses_of(problem, smoothed));
+  result.imu = alignment.estimate;
+  ImuEstimate& estimate = *result.imu;
+  estimate.frame_period_s = problem.period_s;
+  if (estimate.fault != ImuFault::none) return 1.0;
+  const bool has_target = !config.target.points.empty(), is_in_metres = has_target || result.is_scale_read;
+  const double scale = is_in_metres ? 1.0 : estimate.scale;
+  begin_at(smoothed, scale, problem);
+  constexpr double hardly = 1.0;  // of all distances together
+  if (!is_in_metres) believe_distances(hardly, problem);
+  if (problem.gauge == PathGauge::similarity) problem.gauge = PathGauge::motion;
+  problem.imu = imu_to_solve(*config.imu, std::move(alignment), problem.t_s);
+  Localization again = result;
+  auto with_imu = smooth(problem, recording.frames.frames(), again);
+  estimate.fault = with_imu && with_imu->imu ? fault_of(*with_imu->imu, is_in_metres) : ImuFault::unsettled;
+  if (with_imu && with_imu->imu) fill_estimate(*with_imu->imu, estimate);
+  if (estimate.fault != ImuFault::none) return 1.0;
+  const SmoothedImu& found = *with_imu->imu;
+  if (has_target) {
+    estimate.scale = 1.0 + found.target_scale;
+    estimate.sigma_scale = found.sigma_target;
+  } else if (!is_in_metres) {
+    estimate.sigma_scale = found.sigma_scale;
+  }
+  again.imu = estimate;
+  result = std::move(again);
+  smoothed = std::move(*with_imu);
+  result.is_scale_read = result.is_scale_read || !has_target;
+  result.scale_known = result.scale_known || !has_target;
+  return scale;
 }
 
 }  // namespace
@@ -127,7 +243,9 @@ std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEn
   problem->frees_lens = result.is_of_images;
   auto smoothed = smooth_with_loops(recording, *problem, kept);
   if (!smoothed) return std::nullopt;
-  const double scale = solve_in_metres(recording, config, *problem, *smoothed, kept);
+  const double by_sensors = solve_in_metres(recording, config, *problem, *smoothed, kept);
+  const double scale = by_sensors * solve_with_imu(recording, config, *problem, *smoothed, kept);
+  if (kept.imu) kept.imu->scale *= by_sensors;
   std::vector<PathStep> path = std::move(result.path);
   result = std::move(kept);
   frames.put_back(result.path, path);

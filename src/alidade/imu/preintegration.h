@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <span>
+
+#include "alidade/imu/imu.h"
+
+namespace alidade {
+
+/// What an IMU says of the motion between two times, in its axes at the first: rotation, and what the specific force f
+/// alone does to velocity and position, ∫ R f and ∫∫ R f. With position p, velocity v and rotation R of the IMU at the
+/// first time, p⁺ at the second is p + v Δ + ½ g Δ² + R `position`, v⁺ is v + g Δ + R `velocity`. C. Forster et al.,
+/// "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry", TRO 33(1), 2017.
+struct ImuStep {
+  double dt_s = 0.0;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< first_from_second
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero(), position = Eigen::Vector3d::Zero();
+  /// Derivatives by the biases; of the rotation on the right: R exp(J δb).
+  Eigen::Matrix3d rotation_by_rate = Eigen::Matrix3d::Zero(), velocity_by_rate = Eigen::Matrix3d::Zero(),
+                  position_by_rate = Eigen::Matrix3d::Zero(), velocity_by_force = Eigen::Matrix3d::Zero(),
+                  position_by_force = Eigen::Matrix3d::Zero();
+  /// By a time that both ends are later by.
+  Eigen::Vector3d rotation_by_time = Eigen::Vector3d::Zero(), velocity_by_time = Eigen::Vector3d::Zero(),
+                  position_by_time = Eigen::Vector3d::Zero();
+};
+
+/// None where the readings do not reach from the first time to the second, or leave out more than `max_gap_s`. Between
+/// readings rate and force are straight lines. `rate_bias` and `force_bias` are subtracted.
+[[nodiscard]] std::optional<ImuStep> preintegrated(std::span<const ImuReading> readings, double from_s, double to_s,
+                                                   double max_gap_s, const Eigen::Vector3d& rate_bias,
+                                                   const Eigen::Vector3d& force_bias);
+
+/// The reading at a time, between the two around it. None beyond the first and the last.
+[[nodiscard]] std::optional<ImuReading> reading_at(std::span<const ImuReading> readings, double t_s);
+
+/// Median of the times between readings; 0: there are not two.
+[[nodiscard]] double usual_period_s(std::span<const ImuReading> readings);
+
+}  // namespace alidade

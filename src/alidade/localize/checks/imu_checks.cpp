@@ -1,0 +1,105 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/localize/checks/judge.h"
+
+// What is said of an IMU beside the camera.
+
+namespace alidade {
+namespace {
+
+std::string mounting_text(const ImuEstimate& imu) {
+  const Eigen::Quaterniond& q = imu.cam_from_imu.rotation;
+  return fmt::format(
+      "the IMU's axes are rotated by {:.3g}° from the given mounting; by its rotations quaternion_wxyz is [{:.4f}, "
+      "{:.4f}, {:.4f}, {:.4f}]",
+      imu.angle_rad / degree, q.w(), q.x(), q.y(), q.z());
+}
+
+std::string misfit_text(const ImuEstimate& imu) {
+  const bool is_of_path = imu.force_noise_factor > 1.0 || imu.rate_noise_factor > 1.0;
+  const std::string what =
+      is_of_path
+          ? fmt::format(
+                "the IMU's readings do not fit the path (noise of rates {:.2g}, of forces {:.2g} times the given "
+                "one)",
+                imu.rate_noise_factor, imu.force_noise_factor)
+          : "the IMU's forces do not fit the path";
+  return what + ": check the axes and units of the accelerometer";
+}
+
+}  // namespace
+
+std::string imu_fault_text(const ImuEstimate& imu) {
+  switch (imu.fault) {
+    case ImuFault::none:
+      return "";
+    case ImuFault::other_time:
+      return "none of the IMU's readings is of the time of the path (t_s)";
+    case ImuFault::rate_degrees:
+      return "the IMU's angular rates are in degrees per second, not rad/s";
+    case ImuFault::rate_unit:
+      return "the camera rotates " + text_of(imu.ratio) +
+             " times as fast as the IMU's angular rates say: another unit?";
+    case ImuFault::mirrored:
+      return "the IMU's axes are left-handed: one has the wrong sign, or two are exchanged";
+    case ImuFault::mounting:
+      return mounting_text(imu);
+    case ImuFault::unmounted:
+      return "no mounting of the IMU is given, and the camera rotates too little to determine it";
+    case ImuFault::other_motion:
+      return "the IMU's angular rates and the camera's rotations have nothing in common: another recording, or a clock "
+             "that is off by more than a second";
+    case ImuFault::force_g:
+      return "the IMU's forces are in g, not m/s²";
+    case ImuFault::force_unit:
+      return "the IMU's mean force is " + text_of(imu.ratio) + " times gravity: another unit?";
+    case ImuFault::no_gravity:
+      return "gravity has been subtracted from the IMU's forces (on average " + text_of(imu.ratio) +
+             " of it is left): they have to be as the accelerometer reads them";
+    case ImuFault::reversed:
+      return "the IMU's forces have the other sign: at rest the axis that points upwards reads +9.81 m/s²";
+    case ImuFault::still:
+      return "the camera accelerates too little for the IMU to determine the scale";
+    case ImuFault::misfit:
+      return misfit_text(imu);
+    case ImuFault::unsettled:
+      return "the path could not be solved with the IMU's readings";
+  }
+  return "";
+}
+
+/// Of readings that are used: what of them is not as given.
+void add_imu(const Localization& report, Verdict& verdict) {
+  if (!report.imu || report.imu->fault != ImuFault::none) return;
+  const ImuEstimate& imu = *report.imu;
+  constexpr double many = 0.05, much = 3.0;
+  const double late = std::abs(imu.late_s);
+  if (late > imu.frame_period_s)
+    verdict.checks.push_back({"IMU clock", State::care,
+                              fmt::format("the IMU's clock is {:.3g} s {} the camera's, {:.2g} frames: corrected", late,
+                                          imu.late_s > 0.0 ? "after" : "before", late / imu.frame_period_s),
+                              late, imu.frame_period_s, "s", "path"});
+  const double num = static_cast<double>(imu.num_steps + imu.num_rejected + imu.num_missing);
+  const double missing = static_cast<double>(imu.num_missing) / num,
+               rejected = static_cast<double>(imu.num_rejected) / num;
+  if (missing > many)
+    verdict.checks.push_back({"IMU readings", State::care,
+                              text_of(100.0 * missing, 2) + " % of the frames have no readings of the IMU around them",
+                              missing, many, "1", "path"});
+  if (rejected > many)
+    verdict.checks.push_back({"IMU rejected", State::care,
+                              text_of(100.0 * rejected, 2) + " % of the IMU's readings are rejected", rejected, many,
+                              "1", "path"});
+  const double noise = std::max(imu.rate_noise_factor, imu.force_noise_factor);
+  if (noise > much)
+    verdict.checks.push_back({"IMU noise", State::care,
+                              "the noise of the IMU's " +
+                                  std::string(imu.force_noise_factor > imu.rate_noise_factor ? "forces" : "rates") +
+                                  " is " + text_of(noise, 2) + " times the given one; σ is enlarged for it",
+                              noise, much, "1", "path"});
+}
+
+}  // namespace alidade

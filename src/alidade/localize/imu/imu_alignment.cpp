@@ -1,0 +1,230 @@
+#include "alidade/localize/imu/imu_alignment.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/imu/preintegration.h"
+#include "alidade/localize/imu/imu_rates.h"
+
+namespace alidade {
+namespace {
+
+/// Mean force over gravity, of the readings that are of the path's time.
+std::optional<double> mean_force(const Imu& imu, std::span<const TimedPose> path) {
+  double sum = 0.0, num = 0.0;
+  for (const ImuReading& reading : imu.readings) {
+    if (reading.t_s < path.front().t_s || reading.t_s > path.back().t_s) continue;
+    sum += reading.force_m_s2.norm();
+    num += 1.0;
+  }
+  constexpr double few = 10.0;
+  return num < few ? std::nullopt : std::optional(sum / num / imu.gravity_m_s2);
+}
+
+ImuFault force_fault(double mean) {
+  constexpr double near = 0.3, in_g = 1.0 / 9.81, none = 0.3;
+  if (std::abs(mean - 1.0) < near) return ImuFault::none;
+  if (std::abs(mean / in_g - 1.0) < near) return ImuFault::force_g;
+  return mean < none ? ImuFault::no_gravity : ImuFault::force_unit;
+}
+
+/// What is wrong with the rates, as far as the camera rotates.
+ImuFault rates_fault(const RateMatch& match, ImuEstimate& estimate) {
+  constexpr double hardly_rad_s = 0.02, little = 0.5, certain_chi2 = 30.0, near = 0.05, certain = 5.0;
+  if (match.num == 0) return ImuFault::other_time;
+  if (match.signal_rad_s < hardly_rad_s) return ImuFault::none;
+  if (match.explained < little) return ImuFault::other_motion;
+  if (match.mirrored_chi2 > certain_chi2) return ImuFault::mirrored;
+  estimate.ratio = match.ratio;
+  if (std::abs(match.ratio / degree - 1.0) < 2.0 * near) return ImuFault::rate_degrees;
+  if (std::abs(match.ratio - 1.0) > near + certain * match.sigma_ratio) return ImuFault::rate_unit;
+  return ImuFault::none;
+}
+
+/// The mounting that was given, if the rotations do not contradict it; else theirs.
+ImuFault mount(const Imu& imu, const RateMatch& match, ImuEstimate& estimate) {
+  constexpr double certain_chi2 = 30.0, most_sigma_rad = 0.1;
+  const Eigen::Matrix3d information = match.information;
+  estimate.is_mounting_given = imu.mounting.has_value();
+  if (imu.mounting) {
+    estimate.cam_from_imu = imu.mounting->cam_from_imu;
+    const Eigen::Vector3d off = log_so3(estimate.cam_from_imu.rotation * match.cam_from_imu.conjugate());
+    const double given = imu.mounting->sigma_rotation_rad * imu.mounting->sigma_rotation_rad;
+    // (H⁻¹ + σ² I)⁻¹, also where H is of no full rank.
+    const Eigen::Matrix3d weight =
+        (Eigen::Matrix3d::Identity() + given * information).partialPivLu().solve(information);
+    estimate.angle_rad = off.norm();
+    if (!(off.dot(weight * off) > certain_chi2)) return ImuFault::none;
+    estimate.cam_from_imu.rotation = match.cam_from_imu;
+    return ImuFault::mounting;
+  }
+  estimate.cam_from_imu.rotation = match.cam_from_imu;
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information).eigenvalues()[0];
+  return least > 1.0 / (most_sigma_rad * most_sigma_rad) ? ImuFault::none : ImuFault::unmounted;
+}
+
+/// Three nodes of the path with the steps between them: D = λ (m − arm) + h Rᵀ γ + J β, with λ = 1/scale, γ = λ g and
+/// β = λ times the bias of the forces.
+struct AlignmentRow {
+  Eigen::Vector3d D;
+  Eigen::Matrix<double, 3, 7> J;
+  Eigen::Vector3d force_in_world;  ///< Its mean over the first step.
+  double weight = 1.0;
+};
+
+std::vector<AlignmentRow> rows_of(std::span<const ImuReading> readings, std::span<const TimedPose> path,
+                                  const Eigen::Vector3d& rate_bias, const Eigen::Vector3d& imu_in_cam) {
+  constexpr double apart_s = 0.25;
+  const double max_gap_s = max_imu_gap_s(readings);
+  std::vector<std::size_t> nodes{0};
+  for (std::size_t k = 1; k < path.size(); ++k)
+    if (path[k].t_s - path[nodes.back()].t_s >= apart_s - 1e-6) nodes.push_back(k);
+  std::vector<std::optional<ImuStep>> steps;
+  for (std::size_t i = 0; i + 1 < nodes.size(); ++i)
+    steps.push_back(preintegrated(readings, path[nodes[i]].t_s, path[nodes[i + 1]].t_s, max_gap_s, rate_bias,
+                                  Eigen::Vector3d::Zero()));
+  std::vector<AlignmentRow> rows;
+  for (std::size_t i = 0; i + 1 < steps.size(); ++i) {
+    if (!steps[i] || !steps[i + 1]) continue;
+    const ImuStep &a = *steps[i], &b = *steps[i + 1];
+    const Rigid3 &p0 = path[nodes[i]].world_from_cam, &p1 = path[nodes[i + 1]].world_from_cam,
+                 &p2 = path[nodes[i + 2]].world_from_cam;
+    const Eigen::Matrix3d R0t = p0.rotation.conjugate().toRotationMatrix(), R01 = R0t * p1.rotation.toRotationMatrix();
+    const auto change = [&](const Eigen::Vector3d& q0, const Eigen::Vector3d& q1, const Eigen::Vector3d& q2) {
+      return Eigen::Vector3d(R0t * ((q2 - q1) / b.dt_s - (q1 - q0) / a.dt_s));
+    };
+    const Eigen::Vector3d arm = change(p0.rotation * imu_in_cam, p1.rotation * imu_in_cam, p2.rotation * imu_in_cam);
+    AlignmentRow row{
+        change(p0.translation, p1.translation, p2.translation), {}, p0.rotation * a.velocity / a.dt_s, 1.0};
+    row.J.col(0) = a.velocity - a.position / a.dt_s + R01 * b.position / b.dt_s - arm;
+    row.J.middleCols<3>(1) = 0.5 * (a.dt_s + b.dt_s) * R0t;
+    row.J.rightCols<3>() = a.velocity_by_force - a.position_by_force / a.dt_s + R01 * b.position_by_force / b.dt_s;
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+struct AlignmentFit {
+  Eigen::Vector<double, 7> x = Eigen::Vector<double, 7>::Zero();
+  Eigen::Matrix<double, 7, 7> cov = Eigen::Matrix<double, 7, 7>::Zero();
+};
+
+enum class Gravity { free, known };
+
+/// Gravity's size, and the bias's, as far as they are known, about its direction `before`.
+std::optional<AlignmentFit> fit(std::span<const AlignmentRow> rows, const Imu& imu, Gravity gravity,
+                                const AlignmentFit* before) {
+  Eigen::Matrix<double, 7, 7> H = Eigen::Matrix<double, 7, 7>::Zero();
+  Eigen::Vector<double, 7> g = Eigen::Vector<double, 7>::Zero();
+  double weights = 0.0, squares = 0.0;
+  for (const AlignmentRow& row : rows) {
+    H += row.weight * row.J.transpose() * row.J;
+    g += row.weight * row.J.transpose() * row.D;
+    weights += 3.0 * row.weight;
+    if (before) squares += row.weight * (row.D - row.J * before->x).squaredNorm();
+  }
+  const double variance = before ? squares / std::max(weights - 7.0, 1.0) : 1.0;
+  if (before && gravity == Gravity::known) {
+    const double lambda = before->x[0];
+    Eigen::Vector<double, 7> of_gravity = Eigen::Vector<double, 7>::Zero();
+    of_gravity.segment<3>(1) = before->x.segment<3>(1).normalized();
+    of_gravity[0] = -imu.gravity_m_s2;
+    H += variance / std::pow(lambda * imu.sigma_gravity_m_s2, 2) * of_gravity * of_gravity.transpose();
+    H.diagonal().tail<3>().array() += variance / std::pow(lambda * imu.noise.sigma_force_bias, 2);
+  } else {
+    H.diagonal().tail<3>().array() += 1e-3 * H.diagonal().tail<3>().sum();  // of a camera that hardly rotates
+  }
+  const Eigen::LDLT<Eigen::Matrix<double, 7, 7>> ldlt(H);
+  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 0.0)) return std::nullopt;
+  AlignmentFit out{ldlt.solve(g), variance * ldlt.solve(Eigen::Matrix<double, 7, 7>::Identity())};
+  if (!out.x.allFinite() || !out.cov.allFinite()) return std::nullopt;
+  return out;
+}
+
+void weigh(std::vector<AlignmentRow>& rows, const AlignmentFit& at) {
+  std::vector<double> sizes;
+  for (const AlignmentRow& row : rows) sizes.push_back((row.D - row.J * at.x).norm());
+  std::vector<double> sorted = sizes;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  const double usual = 3.0 * *middle + 1e-12;  // of three components the median is 1.5σ
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].weight = 1.0 / (1.0 + std::pow(sizes[i] / usual, 2));
+}
+
+/// Why forces determine no scale: in the world they are constant where a camera does not accelerate.
+ImuFault undetermined(std::span<const AlignmentRow> rows) {
+  constexpr double hardly_m_s2 = 0.2;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const AlignmentRow& row : rows) mean += row.force_in_world / static_cast<double>(rows.size());
+  double squares = 0.0;
+  for (const AlignmentRow& row : rows) squares += (row.force_in_world - mean).squaredNorm();
+  return squares < hardly_m_s2 * hardly_m_s2 * static_cast<double>(rows.size()) ? ImuFault::still : ImuFault::misfit;
+}
+
+/// Scale, gravity and the forces' bias.
+ImuFault find_scale(const Imu& imu, std::span<const ImuReading> readings, std::span<const TimedPose> path,
+                    ImuEstimate& estimate) {
+  std::vector<AlignmentRow> rows = rows_of(readings, path, estimate.rate_bias, estimate.cam_from_imu.translation);
+  constexpr std::size_t enough = 8;
+  if (rows.size() < enough) return ImuFault::other_time;
+  auto found = fit(rows, imu, Gravity::free, nullptr);
+  if (!found) return undetermined(rows);
+  constexpr double certain = 5.0;
+  const auto sure = fit(rows, imu, Gravity::free, &*found);
+  if (sure && sure->x[0] < -certain * std::sqrt(sure->cov(0, 0))) return ImuFault::reversed;
+  constexpr int rounds = 4;
+  for (int round = 0; round < rounds; ++round) {
+    if (found->x[0] == 0.0) return undetermined(rows);
+    weigh(rows, *found);
+    const AlignmentFit before = *found;
+    found = fit(rows, imu, Gravity::known, &before);
+    if (!found) return undetermined(rows);
+  }
+  const double lambda = found->x[0];
+  if (!(lambda > 0.0)) return undetermined(rows);
+  estimate.scale = 1.0 / lambda;
+  estimate.sigma_scale = std::sqrt(found->cov(0, 0)) / lambda;
+  estimate.gravity_in_world = found->x.segment<3>(1) / lambda;
+  estimate.force_bias = found->x.tail<3>() / lambda;
+  constexpr double useless = 0.3;
+  return estimate.sigma_scale < useless ? ImuFault::none : undetermined(rows);
+}
+
+}  // namespace
+
+double max_imu_gap_s(std::span<const ImuReading> readings) {
+  constexpr double usual_gaps = 4.5;
+  return usual_gaps * usual_period_s(readings);
+}
+
+ImuAlignment align_imu(const Imu& imu, std::span<const TimedPose> path) {
+  ImuAlignment out;
+  ImuEstimate& estimate = out.estimate;
+  if (path.size() < 3 || imu.readings.size() < 3) {
+    estimate.fault = ImuFault::other_time;
+    return out;
+  }
+  const std::optional<double> mean = mean_force(imu, path);
+  estimate.fault = mean ? force_fault(*mean) : ImuFault::other_time;
+  estimate.ratio = mean.value_or(1.0);
+  if (estimate.fault != ImuFault::none) return out;
+  const RateMatch match = match_rates(imu.readings, path);
+  estimate.fault = rates_fault(match, estimate);
+  if (estimate.fault == ImuFault::none) estimate.fault = mount(imu, match, estimate);
+  estimate.late_s = match.late_s;
+  estimate.sigma_late_s = match.sigma_late_s;
+  if (estimate.fault != ImuFault::none) return out;
+  const Eigen::Quaterniond& rotation = estimate.cam_from_imu.rotation;
+  for (const ImuReading& reading : imu.readings)
+    out.readings.push_back({reading.t_s - match.late_s, rotation * reading.rate_rad_s, rotation * reading.force_m_s2});
+  estimate.rate_bias = rotation * match.mean_imu - match.mean_cam;
+  estimate.fault = find_scale(imu, out.readings, path, estimate);
+  return out;
+}
+
+}  // namespace alidade

@@ -1,0 +1,218 @@
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "alidade/geometry/similarity.h"
+#include "alidade/localize.h"
+#include "alidade/simulate/draws.h"
+#include "alidade/simulate/imu/imu_readings.h"
+#include "alidade/simulate/underwater.h"
+
+// Metres and gravity by an IMU, without a target; with one a check of its scale.
+
+namespace alidade {
+namespace {
+
+struct ImuRun {
+  Camera camera;
+  std::vector<ObservationFrame> frames;
+  std::vector<TimedPose> truth;
+  std::vector<KnownPoint> target;
+  ImuScene scene;
+  ImuSequence imu;
+  ImuMounting given;  ///< Off by its σ.
+};
+
+/// A camera that swings before points, with an IMU whose mounting and scale factor are known as well as is said.
+ImuRun swinging(std::uint64_t seed, ImuScene scene = {}) {
+  Draws draws(seed + 50);
+  scene.force_scale = scene.noise.sigma_force_scale * draws.normal();
+  ImuMounting given = scene.mounting;
+  given.cam_from_imu.rotation = exp_so3(given.sigma_rotation_rad * draws.normal3()) * given.cam_from_imu.rotation;
+  given.cam_from_imu.translation += given.sigma_position_m * draws.normal3();
+  UnderwaterScene world;
+  world.camera = underwater_camera();
+  world.num_points = 60;
+  world.num_frames = 300;
+  world.dt_s = 1.0 / 30.0;
+  const UnderwaterSequence sequence = simulate_underwater(world, seed);
+  ImuRun run{world.camera, {}, {}, {}, scene, {}, given};
+  for (const UnderwaterFrame& frame : sequence.frames) {
+    ObservationFrame seen{static_cast<long>(run.frames.size()), frame.t_s, {}};
+    for (const UnderwaterObservation& observation : frame.observations)
+      seen.observations.push_back({observation.id, observation.px, 0.0});
+    run.truth.push_back({frame.t_s, frame.world_from_cam});
+    run.frames.push_back(std::move(seen));
+  }
+  for (const UnderwaterPoint& point : sequence.points)
+    if (point.is_known) run.target.push_back({point.id, point.given_in_world, world.sigma_known_m});
+  run.imu = simulate_imu(scene, sequence.world_from_cam, -0.5, run.truth.back().t_s + 0.5, seed + 100);
+  return run;
+}
+
+LocalizeConfig with_imu(const ImuRun& run) {
+  LocalizeConfig config;
+  config.imu = Imu{.readings = run.imu.readings, .mounting = run.given, .noise = run.scene.noise};
+  config.imu->gravity_m_s2 = run.scene.gravity_in_world.norm();
+  return config;
+}
+
+/// Length of the path over that of the truth.
+double scale_of(const Localization& result, const ImuRun& run) {
+  std::vector<Eigen::Vector3d> truth, path;
+  for (std::size_t k = 0; k < result.path.size(); ++k) {
+    truth.push_back(run.truth[k].world_from_cam.translation);
+    path.push_back(result.path[k].world_from_cam.translation);
+  }
+  return aligned(truth, path, false)->scale;
+}
+
+double chi2(const Eigen::Vector3d& error, const Eigen::Vector3d& sigma) {
+  return error.cwiseQuotient(sigma).squaredNorm();
+}
+
+TEST(LocalizeImu, GivesMetresGravityAndItsOwnErrorsWithoutATarget) {
+  constexpr int num_seeds = 6;
+  double num_used = 0.0, scales = 0.0, rates = 0.0, forces = 0.0, clocks = 0.0, gravities = 0.0;
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    const ImuRun run = swinging(seed);
+    const Localization result = localize(run.frames, run.camera, with_imu(run), run.truth);
+    ASSERT_TRUE(result.imu);
+    if (result.imu->fault != ImuFault::none) {  // a path in the wrong minimum is no path in metres, and that is named
+      EXPECT_FALSE(result.scale_known) << seed;
+      EXPECT_FALSE(result.verdict.checks.empty());
+      continue;
+    }
+    num_used += 1.0;
+    EXPECT_TRUE(result.is_scale_read);
+    EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+    const ImuEstimate& imu = *result.imu;
+    const double off = std::log(scale_of(result, run));
+    RecordProperty("scale_percent_" + std::to_string(seed), std::to_string(100.0 * off));
+    RecordProperty("sigma_percent_" + std::to_string(seed), std::to_string(100.0 * imu.sigma_scale));
+    EXPECT_NEAR(off, 0.0, 0.01) << seed;
+    EXPECT_LT(imu.sigma_scale, 0.01);
+    scales += std::pow(off / imu.sigma_scale, 2) / num_seeds;
+    rates += chi2(imu.rate_bias - run.imu.rate_bias.back(), imu.sigma_rate_bias) / (3.0 * num_seeds);
+    forces += chi2(imu.force_bias - run.imu.force_bias.back(), imu.sigma_force_bias) / (3.0 * num_seeds);
+    clocks += std::pow(imu.late_s / imu.sigma_late_s, 2) / num_seeds;
+    // In the camera, where it does not depend on how the world lies.
+    const Eigen::Vector3d is = result.path.back().world_from_cam.rotation.conjugate() * imu.gravity_in_world;
+    const Eigen::Vector3d should = run.truth.back().world_from_cam.rotation.conjugate() * run.scene.gravity_in_world;
+    EXPECT_LT((is - should).norm(), 0.1) << seed;
+    gravities += (is - should).norm() / num_seeds;
+  }
+  EXPECT_GE(num_used, num_seeds - 1.0);
+  RecordProperty("used", std::to_string(num_used));
+  RecordProperty("nees_scale", std::to_string(scales));
+  RecordProperty("nees_rate_bias", std::to_string(rates));
+  RecordProperty("nees_force_bias", std::to_string(forces));
+  RecordProperty("nees_clock", std::to_string(clocks));
+  RecordProperty("gravity_m_s2", std::to_string(gravities));
+  // Six draws of one number: 99.9 % within 3.7; of 18, which are not independent of each other, within 2.5.
+  for (const double one : {scales, clocks}) EXPECT_LT(one, 3.7);
+  for (const double three : {rates, forces}) EXPECT_LT(three, 2.5);
+  EXPECT_GT(scales + clocks, 0.1);
+}
+
+/// A target that is given 3 % too large in all, as no observation of it shows.
+TEST(LocalizeImu, ChecksTheScaleOfATarget) {
+  for (const double larger : {1.0, 1.05}) {
+    const ImuRun run = swinging(1);
+    LocalizeConfig config = with_imu(run);
+    for (KnownPoint point : run.target) {
+      point.point_in_world *= larger;
+      config.target.points.push_back(point);
+    }
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    ASSERT_EQ(result.sensor_scales.size(), 1u);
+    const SensorScale& read = result.sensor_scales.front();
+    ASSERT_GT(read.sigma_rel, 0.0) << result.verdict.sentence;
+    EXPECT_LT(read.sigma_rel, 0.01);
+    EXPECT_NEAR(std::log(read.scale * larger), 0.0, 3.5 * read.sigma_rel) << larger;
+    const auto named = result.verdict.sentence.find("by the IMU than by the target");
+    EXPECT_EQ(named != std::string::npos, larger != 1.0) << result.verdict.sentence;
+  }
+}
+
+TEST(LocalizeImu, AClockThatIsOffIsFoundAndNamed) {
+  ImuScene scene;
+  scene.late_s = 0.12;
+  const ImuRun run = swinging(2, scene);
+  const Localization result = localize(run.frames, run.camera, with_imu(run), run.truth);
+  ASSERT_TRUE(result.imu);
+  EXPECT_EQ(result.imu->fault, ImuFault::none) << result.verdict.sentence;
+  EXPECT_NEAR(result.imu->late_s, 0.12, 4.0 * result.imu->sigma_late_s);
+  EXPECT_NE(result.verdict.sentence.find("the IMU's clock is 0.12 s after the camera's"), std::string::npos)
+      << result.verdict.sentence;
+  EXPECT_NEAR(std::log(scale_of(result, run)), 0.0, 3.5 * result.imu->sigma_scale);
+}
+
+TEST(LocalizeImu, WithoutAMountingItsRotationIsFound) {
+  const ImuRun run = swinging(2);
+  LocalizeConfig config = with_imu(run);
+  config.imu->mounting.reset();
+  const Localization result = localize(run.frames, run.camera, config, run.truth);
+  ASSERT_TRUE(result.imu);
+  ASSERT_EQ(result.imu->fault, ImuFault::none) << result.verdict.sentence;
+  const Rigid3& should = run.scene.mounting.cam_from_imu;
+  const Eigen::Vector3d off = log_so3(result.imu->cam_from_imu.rotation * should.rotation.conjugate());
+  EXPECT_LT(off.norm(), 0.02);
+  EXPECT_LT(chi2(off, result.imu->sigma_rotation_rad), 16.3);
+  EXPECT_NEAR(std::log(scale_of(result, run)), 0.0, 3.5 * result.imu->sigma_scale);
+}
+
+TEST(LocalizeImu, GapsAndBlowsAreBridged) {
+  ImuRun run = swinging(4);
+  std::erase_if(run.imu.readings, [](const ImuReading& each) { return each.t_s > 3.0 && each.t_s < 4.0; });
+  for (ImuReading& each : run.imu.readings)
+    if (each.t_s > 6.0 && each.t_s < 6.03) each.force_m_s2.x() += 60.0;
+  const Localization result = localize(run.frames, run.camera, with_imu(run), run.truth);
+  ASSERT_TRUE(result.imu);
+  ASSERT_EQ(result.imu->fault, ImuFault::none) << result.verdict.sentence;
+  EXPECT_NEAR(static_cast<double>(result.imu->num_missing), 31.0, 2.0);
+  EXPECT_GE(result.imu->num_rejected, 1u);
+  EXPECT_NE(result.verdict.sentence.find("have no readings of the IMU"), std::string::npos) << result.verdict.sentence;
+  EXPECT_NEAR(std::log(scale_of(result, run)), 0.0, 3.5 * result.imu->sigma_scale);
+}
+
+/// What is not as it is said to be is named, and the path is what it is without an IMU.
+TEST(LocalizeImu, FaultsAreNamedAndNotUsed) {
+  const ImuRun run = swinging(5);
+  const auto fault_of = [&](const auto& change) {
+    LocalizeConfig config = with_imu(run);
+    change(*config.imu);
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    EXPECT_FALSE(result.scale_known);
+    EXPECT_EQ(result.verdict.state, State::care);
+    EXPECT_NE(result.verdict.sentence.find("IMU"), std::string::npos) << result.verdict.sentence;
+    return result.imu->fault;
+  };
+  const auto each_of = [](Imu& imu, const auto& change) {
+    for (ImuReading& reading : imu.readings) change(reading);
+  };
+  EXPECT_EQ(fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { r.rate_rad_s *= 180.0 / std::numbers::pi; }); }),
+            ImuFault::rate_degrees);
+  EXPECT_EQ(fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { r.rate_rad_s *= 1.5; }); }), ImuFault::rate_unit);
+  EXPECT_EQ(fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { r.force_m_s2 /= 9.80665; }); }),
+            ImuFault::force_g);
+  EXPECT_EQ(fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { r.force_m_s2 *= 1000.0; }); }),
+            ImuFault::force_unit);
+  EXPECT_EQ(fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { r.force_m_s2 *= -1.0; }); }), ImuFault::reversed);
+  EXPECT_EQ(fault_of([&](Imu& imu) {
+              each_of(imu, [](ImuReading& r) {
+                r.rate_rad_s.x() *= -1.0;
+                r.force_m_s2.x() *= -1.0;
+              });
+            }),
+            ImuFault::mirrored);
+  EXPECT_EQ(fault_of([&](Imu& imu) { imu.mounting->cam_from_imu.rotation = Eigen::Quaterniond::Identity(); }),
+            ImuFault::mounting);
+  EXPECT_EQ(fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { r.t_s += 1e9; }); }), ImuFault::other_time);
+  EXPECT_EQ(
+      fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { std::swap(r.force_m_s2.x(), r.force_m_s2.z()); }); }),
+      ImuFault::misfit);
+}
+
+}  // namespace
+}  // namespace alidade

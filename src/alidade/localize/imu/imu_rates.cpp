@@ -1,0 +1,168 @@
+#include "alidade/localize/imu/imu_rates.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/decompositions.h"
+
+namespace alidade {
+namespace {
+
+/// ∫ rate dt from the first reading on, and so its mean between any two times.
+class RateIntegral {
+ public:
+  explicit RateIntegral(std::span<const ImuReading> readings) : readings_(readings) {
+    sums_.push_back(Eigen::Vector3d::Zero());
+    for (std::size_t i = 1; i < readings.size(); ++i)
+      sums_.push_back(sums_.back() + 0.5 * (readings[i].t_s - readings[i - 1].t_s) *
+                                         (readings[i].rate_rad_s + readings[i - 1].rate_rad_s));
+  }
+  [[nodiscard]] std::optional<Eigen::Vector3d> mean(double from_s, double to_s) const {
+    const auto begin = at(from_s), end = at(to_s);
+    if (!begin || !end) return std::nullopt;
+    return Eigen::Vector3d((*end - *begin) / (to_s - from_s));
+  }
+
+ private:
+  [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const {
+    const auto after = std::ranges::upper_bound(readings_, t_s, {}, &ImuReading::t_s);
+    if (after == readings_.begin() || after == readings_.end()) return std::nullopt;
+    const ImuReading &a = *(after - 1), &b = *after;
+    const double h = b.t_s - a.t_s, s = t_s - a.t_s;
+    const Eigen::Vector3d rate = a.rate_rad_s + 0.5 * s / h * (b.rate_rad_s - a.rate_rad_s);
+    return Eigen::Vector3d(sums_[static_cast<std::size_t>(after - readings_.begin()) - 1] + s * rate);
+  }
+  std::span<const ImuReading> readings_;
+  std::vector<Eigen::Vector3d> sums_;
+};
+
+/// The camera's mean rate in an interval.
+struct CameraRate {
+  double from_s = 0.0, to_s = 0.0;
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+};
+
+/// One after the other: neighbours that overlap would not be independent.
+std::vector<CameraRate> camera_rates(std::span<const TimedPose> path) {
+  constexpr double long_enough_s = 0.095, too_long_s = 0.5;
+  constexpr std::size_t most = 1000;
+  std::vector<CameraRate> rates;
+  for (std::size_t i = 0, end = 0; i + 1 < path.size(); i = end) {
+    for (end = i + 1; end + 1 < path.size() && path[end].t_s - path[i].t_s < long_enough_s;) ++end;
+    const double dt_s = path[end].t_s - path[i].t_s;
+    if (!(dt_s < too_long_s)) continue;
+    const auto turn = path[i].world_from_cam.rotation.conjugate() * path[end].world_from_cam.rotation;
+    rates.push_back({path[i].t_s, path[end].t_s, log_so3(turn) / dt_s});
+  }
+  const std::size_t stride = rates.size() / most + 1;
+  std::vector<CameraRate> some;
+  for (std::size_t i = 0; i < rates.size(); i += stride) some.push_back(rates[i]);
+  return some;
+}
+
+/// Sums about the means.
+struct Moments {
+  std::size_t num = 0;
+  Eigen::Vector3d cam = Eigen::Vector3d::Zero(), imu = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d cam_imu = Eigen::Matrix3d::Zero(), imu_imu = Eigen::Matrix3d::Zero();
+  double cam_cam = 0.0;
+
+  /// What is left of the camera's squares by the best linear function of the IMU's.
+  [[nodiscard]] double left() const {
+    Eigen::Matrix3d H = imu_imu;
+    constexpr double hardly = 1e-9;
+    H.diagonal().array() += hardly * (imu_imu.trace() + 1e-12);
+    return cam_cam - (cam_imu * H.ldlt().solve(cam_imu.transpose())).trace();
+  }
+};
+
+Moments moments(std::span<const CameraRate> rates, const RateIntegral& integral, double late_s) {
+  Moments sums;
+  for (const CameraRate& each : rates) {
+    const auto imu = integral.mean(each.from_s + late_s, each.to_s + late_s);
+    if (!imu) continue;
+    ++sums.num;
+    sums.cam += each.rate;
+    sums.imu += *imu;
+    sums.cam_imu += each.rate * imu->transpose();
+    sums.imu_imu += *imu * imu->transpose();
+    sums.cam_cam += each.rate.squaredNorm();
+  }
+  if (sums.num == 0) return sums;
+  const double num = static_cast<double>(sums.num);
+  sums.cam /= num;
+  sums.imu /= num;
+  sums.cam_imu -= num * sums.cam * sums.imu.transpose();
+  sums.imu_imu -= num * sums.imu * sums.imu.transpose();
+  sums.cam_cam -= num * sums.cam.squaredNorm();
+  return sums;
+}
+
+/// The clock at which least is left, by a grid, then by the parabola through its neighbours.
+void find_clock(std::span<const CameraRate> rates, const RateIntegral& integral, RateMatch& match) {
+  constexpr double most_s = 1.0, step_s = 0.01;
+  constexpr int num_steps = static_cast<int>(most_s / step_s + 0.5);
+  constexpr double enough_share = 0.6;
+  const auto enough = static_cast<std::size_t>(enough_share * static_cast<double>(rates.size()));
+  const auto left_at = [&](double late_s) {
+    const Moments sums = moments(rates, integral, late_s);
+    return sums.num >= std::max<std::size_t>(enough, 10) ? sums.left() / static_cast<double>(sums.num) : 1e300;
+  };
+  int best = 0;
+  double least = left_at(0.0);
+  for (int i = -num_steps; i <= num_steps; ++i) {
+    const double left = left_at(i * step_s);
+    if (!(left < least)) continue;
+    least = left;
+    best = i;
+  }
+  if (std::abs(best) >= num_steps || !(least < 1e299)) return;
+  const double before = left_at((best - 1) * step_s), after = left_at((best + 1) * step_s);
+  const double bend = before - 2.0 * least + after;
+  if (!(bend > 0.0) || !(before + after < 1e299)) return;
+  const double offset = 0.5 * (before - after) / bend;
+  // Of a mean of squares Q/N with its noise σ² = Q/(3N): σ_t² = 2 σ² / Q″.
+  const double noise = std::max(least - bend * 0.5 * offset * offset, 1e-12) / 3.0;
+  match.sigma_late_s = step_s * std::sqrt(2.0 * noise / (bend * static_cast<double>(rates.size())));
+  match.late_s = step_s * (best + offset);
+}
+
+}  // namespace
+
+RateMatch match_rates(std::span<const ImuReading> readings, std::span<const TimedPose> path) {
+  RateMatch match;
+  const std::vector<CameraRate> rates = camera_rates(path);
+  const RateIntegral integral(readings);
+  find_clock(rates, integral, match);
+  constexpr double unsure_s = 0.05;
+  if (!(match.sigma_late_s < unsure_s)) match.late_s = 0.0;
+  const Moments sums = moments(rates, integral, match.late_s);
+  match.num = sums.num;
+  constexpr std::size_t enough = 10;
+  if (sums.num < enough) return match;
+  const double num = static_cast<double>(sums.num), left = std::max(sums.left(), 1e-12);
+  const Svd svd = svd_of(sums.cam_imu);
+  const double sign = (svd.U * svd.V.transpose()).determinant() < 0.0 ? -1.0 : 1.0;
+  const Eigen::Matrix3d R = svd.U * Eigen::Vector3d(1.0, 1.0, sign).asDiagonal() * svd.V.transpose();
+  const double variance = left / (3.0 * num), squares = sums.imu_imu.trace();
+  match.cam_from_imu = Eigen::Quaterniond(R);
+  match.mirrored_chi2 =
+      sign < 0.0 && squares > 0.0
+          ? (std::pow(svd.values.sum(), 2) - std::pow(svd.values[0] + svd.values[1] - svd.values[2], 2)) /
+                (squares * variance)
+          : 0.0;
+  const double in_common = svd.values[0] + svd.values[1] + std::abs(svd.values[2]);
+  match.ratio = squares > 0.0 ? in_common / squares : 1.0;
+  match.sigma_ratio = squares > 0.0 ? std::sqrt(variance / squares) : 1e9;
+  match.explained = sums.cam_cam > 0.0 ? 1.0 - left / sums.cam_cam : 0.0;
+  match.signal_rad_s = match.ratio * std::sqrt(squares / num);
+  const Eigen::Matrix3d in_cam = match.ratio * match.ratio * R * sums.imu_imu * R.transpose();
+  match.information = (in_cam.trace() * Eigen::Matrix3d::Identity() - in_cam) / variance;
+  match.mean_imu = sums.imu;
+  match.mean_cam = sums.cam;
+  return match;
+}
+
+}  // namespace alidade

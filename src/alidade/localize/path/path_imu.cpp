@@ -1,0 +1,205 @@
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/localize/imu/imu_alignment.h"
+#include "alidade/localize/path/path_system.h"
+
+// What a path is solved from where there is an IMU: its rates between two frames, its forces between three, in place
+// of drawn accelerations; and what is known of its own numbers, which stand first of all that is shared.
+
+namespace alidade {
+namespace {
+
+double upper_median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+constexpr double middle_of_three = 2.366;  // of χ² of three components, the median
+
+}  // namespace
+
+/// Steps between frames, as far as there are readings, by the biases to begin at.
+void PathSmoother::begin_imu() {
+  if (!problem_.imu) return;
+  const SmootherImu& imu = *problem_.imu;
+  state_.imu = imu.start;
+  const double max_gap_s = max_imu_gap_s(imu.readings);
+  const auto is_jump = [&](std::size_t k) { return k < problem_.is_jump.size() && problem_.is_jump[k]; };
+  const std::size_t num = problem_.t_s.size();
+  for (std::size_t k = 0; k + 1 < num; ++k) {
+    const double from_s = problem_.t_s[k], to_s = problem_.t_s[k + 1], mid_s = 0.5 * (from_s + to_s);
+    const ImuState::Bias bias = imu.start.bias_at(mid_s);
+    const auto step = preintegrated(imu.readings, from_s, to_s, max_gap_s, bias.rate, bias.force);
+    steps_.push_back(step && !is_jump(k + 1) ? std::optional(ImuStepAt{*step, mid_s, bias.rate, bias.force})
+                                             : std::nullopt);
+    rates_used_.push_back(steps_.back().has_value());
+  }
+  for (std::size_t k = 0; k + 2 < num; ++k) forces_used_.push_back(steps_[k] && steps_[k + 1]);
+  leave_out_blows();
+}
+
+/// Steps that are far from where the problem begins, by what the others are: an IMU is surer of a step than the
+/// observations of a frame are, and a blow would bend the path before it is known for one.
+void PathSmoother::leave_out_blows() {
+  constexpr double far = 6.0;
+  const auto leave_out = [&](std::vector<bool>& used, const auto& error_of) {
+    std::vector<double> sizes, all;
+    for (std::size_t k = 0; k < used.size(); ++k) {
+      sizes.push_back(used[k] ? error_of(k).norm() : 0.0);
+      if (used[k]) all.push_back(sizes.back());
+    }
+    if (all.empty()) return;
+    const double limit = far * upper_median(std::move(all));
+    for (std::size_t k = 0; k < used.size(); ++k) used[k] = used[k] && sizes[k] <= limit;
+  };
+  leave_out(rates_used_, [&](std::size_t k) { return Eigen::Vector3d(rates_at(state_, k).error); });
+  leave_out(forces_used_, [&](std::size_t k) { return Eigen::Vector3d(forces_at(state_, k).error); });
+}
+
+ImuRows PathSmoother::rates_at(const SmootherState& state, std::size_t k) const {
+  return rotation_rows(*steps_[k], std::span<const Rigid3, 2>(state.poses.data() + k, 2), state.imu);
+}
+
+ImuRows PathSmoother::forces_at(const SmootherState& state, std::size_t k) const {
+  return force_rows(*steps_[k], *steps_[k + 1], std::span<const Rigid3, 3>(state.poses.data() + k, 3), state.imu);
+}
+
+double PathSmoother::rates_variance(std::size_t k) const {
+  return rotation_variance(steps_[k]->step, problem_.imu->noise);
+}
+
+double PathSmoother::forces_variance(std::size_t k) const {
+  return force_variance(steps_[k]->step, steps_[k + 1]->step, problem_.imu->noise);
+}
+
+void PathSmoother::add_imu(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
+  const auto add = [&](const ImuRows& rows, double variance) {
+    PoseChain& chain = system.chain;
+    const double weight = 1.0 / variance;
+    chain.A += weight * rows.J_poses.transpose() * rows.J_poses;
+    chain.a -= weight * rows.J_poses.transpose() * rows.error;
+    chain.U.leftCols(lens_at_) += weight * rows.J_poses.transpose() * rows.J_imu;
+    chain.B.topLeftCorner(lens_at_, lens_at_) += weight * rows.J_imu.transpose() * rows.J_imu;
+    chain.b.head(lens_at_) -= weight * rows.J_imu.transpose() * rows.error;
+    system.cost += weight * rows.error.squaredNorm();
+  };
+  if (uses_rates(k)) add(rates_at(state, k), rate_noise_ * rates_variance(k));
+  if (uses_forces(k)) add(forces_at(state, k), force_noise_ * forces_variance(k));
+}
+
+/// What is known of an IMU before: sizes of its biases and of gravity, walks of the biases, mounting, clock.
+void PathSmoother::add_given_imu(const SmootherState& state, SmootherSystem& system) const {
+  if (!problem_.imu) return;
+  const SmootherImu& given = *problem_.imu;
+  const ImuState& is = state.imu;
+  PoseChain& chain = system.chain;
+  const auto add = [&](int at, const Eigen::Vector3d& error, double sigma, int minus = -1) {
+    const double weight = 1.0 / (sigma * sigma);
+    chain.B.diagonal().segment<3>(at).array() += weight;
+    chain.b.segment<3>(at) -= weight * error;
+    system.cost += weight * error.squaredNorm();
+    if (minus < 0) return;
+    chain.B.diagonal().segment<3>(minus).array() += weight;
+    chain.B.block<3, 3>(at, minus).diagonal().array() -= weight;
+    chain.B.block<3, 3>(minus, at).diagonal().array() -= weight;
+    chain.b.segment<3>(minus) += weight * error;
+  };
+  const auto add_one = [&](int at, double error, double sigma) {
+    chain.B(at, at) += 1.0 / (sigma * sigma);
+    chain.b[at] -= error / (sigma * sigma);
+    system.cost += error * error / (sigma * sigma);
+  };
+  add(0, is.rate_bias[0], given.noise.sigma_rate_bias);
+  add(3, is.force_bias[0], given.noise.sigma_force_bias);
+  for (std::size_t i = 1; i < is.node_t_s.size(); ++i) {
+    const double root_s = std::sqrt(is.node_t_s[i] - is.node_t_s[i - 1]);
+    const int at = 6 * static_cast<int>(i);
+    add(at, is.rate_bias[i] - is.rate_bias[i - 1], given.noise.rate_walk * root_s, at - 6);
+    add(at + 3, is.force_bias[i] - is.force_bias[i - 1], given.noise.force_walk * root_s, at - 3);
+  }
+  add(is.turn_at(), log_so3(is.turn), given.sigma_rotation_rad);
+  add(is.place_at(), is.imu_in_cam - given.start.imu_in_cam, given.sigma_position_m);
+  add_one(is.late_at(), is.late_s, given.sigma_late_s);
+  add_one(is.scale_at(), is.force_scale, given.noise.sigma_force_scale);
+  const double size = is.gravity_in_world.norm(), weight = std::pow(given.sigma_gravity_m_s2, -2);
+  const double error = size - given.gravity_m_s2;
+  const Eigen::Vector3d along = is.gravity_in_world / size;
+  chain.B.block<3, 3>(is.gravity_at(), is.gravity_at()) += weight * along * along.transpose();
+  chain.b.segment<3>(is.gravity_at()) -= weight * error * along;
+  system.cost += weight * error * error;
+}
+
+/// Where residuals are larger than the given noise, σ is enlarged, by their median; a step far beyond that, as of a
+/// blow, is rejected. Whether anything of that differs from before.
+bool PathSmoother::choose_steps() {
+  if (!problem_.imu) return false;
+  constexpr double gate = 21.1;  // χ² of three components: 99.99 %
+  bool is_other = false;
+  const auto choose = [&](std::size_t num, const auto& has, const auto& chi2_of, double& noise,
+                          std::vector<bool>& used) {
+    std::vector<double> all;
+    for (std::size_t k = 0; k < num; ++k)
+      if (has(k)) all.push_back(chi2_of(k));
+    if (all.empty()) return;
+    const double larger = std::max(1.0, upper_median(all) / middle_of_three);
+    constexpr double same = 1.1;
+    is_other = is_other || larger > same * noise || noise > same * larger;
+    noise = larger;
+    std::size_t next = 0;
+    for (std::size_t k = 0; k < num; ++k) {
+      if (!has(k)) continue;
+      const bool fits = all[next++] <= gate * noise;
+      is_other = is_other || fits != used[k];
+      used[k] = fits;
+    }
+  };
+  choose(
+      rates_used_.size(), [&](std::size_t k) { return steps_[k].has_value(); },
+      [&](std::size_t k) { return rates_at(state_, k).error.squaredNorm() / rates_variance(k); }, rate_noise_,
+      rates_used_);
+  choose(
+      forces_used_.size(), [&](std::size_t k) { return steps_[k] && steps_[k + 1]; },
+      [&](std::size_t k) { return forces_at(state_, k).error.squaredNorm() / forces_variance(k); }, force_noise_,
+      forces_used_);
+  return is_other;
+}
+
+/// σ of the logarithm of the path's extent: of its scale, as far as nothing else changes it.
+void PathSmoother::fill_imu(const SmootherSystem& system, const Eigen::MatrixXd& cov, const Asked& asked,
+                            SmoothedPath& path) const {
+  if (!problem_.imu) return;
+  SmoothedImu imu{.state = state_.imu, .sigma = cov.diagonal().head(lens_at_).cwiseSqrt()};
+  imu.rate_noise_factor = std::sqrt(rate_noise_);
+  imu.force_noise_factor = std::sqrt(force_noise_);
+  for (std::size_t k = 0; k < rates_used_.size(); ++k) {
+    imu.num_missing += steps_[k] ? 0 : 1;
+    const bool is_used = uses_rates(k) && (uses_forces(k) || k >= forces_used_.size());
+    imu.num_steps += is_used ? 1 : 0;
+    imu.num_rejected += steps_[k] && !is_used && (k + 1 >= steps_.size() || steps_[k + 1]) ? 1 : 0;
+  }
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Rigid3& pose : state_.poses) centre += pose.translation / static_cast<double>(state_.poses.size());
+  double extent2 = 0.0;
+  for (const Rigid3& pose : state_.poses) extent2 += (pose.translation - centre).squaredNorm();
+  std::vector<Eigen::MatrixXd> W;
+  for (const Rigid3& pose : state_.poses) {
+    W.emplace_back(Eigen::MatrixXd::Zero(6, 1));
+    if (extent2 > 0.0) W.back().topRows<3>() = (pose.translation - centre) / extent2;
+  }
+  const PoseChain::Columns Z = system.chain.solve(W, num_solved());
+  double variance = 0.0;
+  for (std::size_t k = 0; k < W.size(); ++k) variance += W[k].col(0).dot(Z.poses[k].col(0));
+  imu.sigma_scale = std::sqrt(std::max(variance, 0.0));
+  const Eigen::Index at = static_cast<Eigen::Index>(lens_order_.size()) - num_estimated_ + scale_cause;
+  const double information = asked.information(at, at);
+  if (information > 0.0) {
+    imu.target_scale = asked.score[at] / information;
+    imu.sigma_target = 1.0 / std::sqrt(information);
+  }
+  path.imu = std::move(imu);
+}
+
+}  // namespace alidade

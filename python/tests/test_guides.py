@@ -70,7 +70,7 @@ class Capture(InFolder):
         self.assertEqual(done.returncode, 0, done.stderr)
         images = {float(i): cv2.imread(str(file), -1) for i, file in enumerate(sorted(photos.glob("*.png")))}
         guide, earlier = al.CaptureGuide(BOARD, until_px=0.01, is_video=False), 0
-        for t in range(40):  # the same again and again: what was not taken at once is taken at last
+        for t in range(60):  # the same again and again: what was not taken at once is taken at last
             look = guide.push(images[t % 6] + np.uint8(t % 2), float(t))
             if look.taken and look.earlier_t_s is not None:
                 earlier += 1

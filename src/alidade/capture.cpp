@@ -28,14 +28,20 @@ constexpr double same_share = 0.04;    // of the board's size: a pose that is ke
 constexpr double max_blur = 1.8;       // of the sharpest
 constexpr double sharp_px = 1.3;       // is never called blurred
 constexpr double min_gain = 0.004;     // of σ
-// Of the gain of the outline an image must bring the share `choosy`. Who does not follow the outline shows what there
-// is: the longer no photo was taken, the less will do, of all images that were shown; the newest is preferred where
-// it brings `nearly` as much.
-constexpr double choosy = 0.6, nearly = 0.85;
-constexpr double patient_s = 3.0, impatient_s = 8.0;
+// Of the information of the outline an image must bring the share `choosy`. Who does not follow the outline shows what
+// there is: the longer no photo was taken, the less will do, of all images that were shown; the newest is preferred
+// where it brings `nearly` as much. Information, not gain: where little is known any photo brings most of the gain.
+constexpr double choosy = 0.5, nearly = 0.85;
+constexpr double patient_s = 5.0, impatient_s = 12.0;
 // Of what an outline would bring, the part that a photo brings which a hand holds about there: by simulated sessions.
 // Each photo that is taken moves it by this: who shows other poses than the outlines needs more of them.
-constexpr double share_by_hand = 0.85, share_learnt = 0.2, min_share = 0.05;
+constexpr double share_by_hand = 0.85, share_learnt = 0.2, min_share = 0.05, max_share = 1.5;
+// By so much more than a plan foresees does a photo bring, by simulated sessions: the plan tries few poses, and what
+// few photos say of the noise is too much.
+constexpr double unforeseen = 1.25;
+
+/// What a gain, ln of σ before over σ after, adds to the information that there is, as a multiple of it.
+double information_of(double gain) { return std::expm1(2.0 * gain); }
 
 std::uint64_t hash_of(const cv::Mat& image) {
   std::uint64_t hash = 1469598103934665603u;  // FNV-1a, eight bytes at a time
@@ -110,7 +116,7 @@ struct CaptureGuide::State {
   void solve();
   void fill_state();
   CaptureLook judge(const cv::Mat* image, double t_s);
-  [[nodiscard]] double asked_share(double t_s) const;
+  [[nodiscard]] double asked_gain(double t_s) const;
   [[nodiscard]] double gain_of(const BoardView& view) const;
   [[nodiscard]] bool is_held(const BoardView& view) const;
   bool recalls(double t_s, CaptureLook& look) const;
@@ -133,7 +139,8 @@ void CaptureGuide::State::look_closely(const cv::Mat& image) {
 
 void CaptureGuide::State::keep(BoardView view) {
   if (lens->is_solved && plan->best_gain() > 0.0) {
-    const double brought = std::clamp(gain_of(view) / plan->best_gain(), min_share, share_by_hand);
+    const double share_now = information_of(gain_of(view)) / information_of(plan->best_gain());
+    const double brought = std::clamp(share_now, min_share, max_share);
     share += share_learnt * (brought - share);
   }
   view.photo = std::to_string(views.size() + 1);
@@ -169,7 +176,7 @@ void CaptureGuide::State::fill_state() {
     out.sigma = projection_sigma(lens->camera, 32, 24, std::numeric_limits<double>::infinity());
     for (double& sigma_px : out.sigma.values) sigma_px *= correction;
   }
-  if (lens->is_solved) out.photos_to_goal = plan->photos_until(config.until_px / correction, share);
+  if (lens->is_solved) out.photos_to_goal = plan->photos_until(config.until_px / correction, unforeseen * share);
   if (plan->best()) {
     const BoardInImage held = board_in_image(lens->camera, lens->board_points, *plan->best());
     out.next = NextPose{*plan->best(), outline_of(lens->camera, lens->board_points, *plan->best()),
@@ -199,11 +206,12 @@ void CaptureGuide::State::say_way(const BoardView& view, CaptureLook& look) cons
   look.words_mirrored += (look.words_mirrored.empty() ? "" : ": ") + words_to(wanted, now, true);
 }
 
-/// Share of the outline's gain that an image must bring now.
-double CaptureGuide::State::asked_share(double t_s) const {
-  if (takes_what_comes) return 0.0;
+/// What an image must bring now.
+double CaptureGuide::State::asked_gain(double t_s) const {
+  if (takes_what_comes) return min_gain;
   const double late = std::clamp((t_s - *took_s - patient_s) / (impatient_s - patient_s), 0.0, 1.0);
-  return choosy * (1.0 - late);
+  const double asked = choosy * (1.0 - late) * information_of(plan->best_gain());
+  return std::max(min_gain, 0.5 * std::log1p(asked));
 }
 
 double CaptureGuide::State::gain_of(const BoardView& view) const {
@@ -218,7 +226,7 @@ bool CaptureGuide::State::is_held(const BoardView& view) const {
 /// Whether one of the images that were shown is to be taken now.
 bool CaptureGuide::State::recalls(double t_s, CaptureLook& look) const {
   const ShownImage* best = shown.best();
-  if (best == nullptr || best->gain < std::max(min_gain, asked_share(t_s) * plan->best_gain())) return false;
+  if (best == nullptr || best->gain < asked_gain(t_s)) return false;
   look.status = LookStatus::useful;
   look.words = look.words_mirrored = fmt::format("taken, as shown {:.0f} s ago", t_s - best->t_s);
   look.earlier = EarlierImage{best->image, best->view, best->t_s};
@@ -260,7 +268,7 @@ CaptureLook CaptureGuide::State::judge(const cv::Mat* image, double t_s) {
     say(LookStatus::blurred, fmt::format("blurred: σ {:.1f} px, the sharpest {:.1f} px", seen.blur_px, sharpest_px));
     return look;
   }
-  const double asked = std::max(min_gain, asked_share(t_s) * plan->best_gain());
+  const double asked = asked_gain(t_s);
   const ShownImage* best = shown.best();
   if (look.gain >= asked && (takes_what_comes || best == nullptr || look.gain >= nearly * best->gain)) {
     say(LookStatus::useful, "taken");

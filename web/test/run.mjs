@@ -12,7 +12,7 @@ import * as captureReal from './capture_real.mjs';
 import * as live from './live.mjs';
 import * as trouble from './trouble.mjs';
 
-const [templateFile, givenAlidade, only] = process.argv.slice(2); // only: tests whose names hold this
+const [templateFile, givenAlidade, only = ''] = process.argv.slice(2); // only: tests whose names hold this; !this: that do not
 const alidade = givenAlidade && resolve(givenAlidade); // it is run in other folders
 if (!hasBrowser()) {
   console.log(`web: skipped, there is no ${chromiumPath} (CHROMIUM names another)`);
@@ -21,8 +21,9 @@ if (!hasBrowser()) {
 const template = readFileSync(templateFile, 'utf8'), started = Date.now();
 const documents = {servo: {document: servoDocument()}, localize: {document: localizeDocument()}, reproduce: {document: reproduceDocument()}, 'rig, moving target': {document: movingDocument()}};
 const hasAlidade = Boolean(alidade && existsSync(alidade));
-if (hasAlidade && !only) Object.assign(documents, realResults(alidade));
-else if (!only) console.log('web: without the executable only made-up documents are shown');
+const hasAll = !only || only.startsWith('!');
+if (hasAlidade && hasAll) Object.assign(documents, realResults(alidade));
+else if (hasAll) console.log('web: without the executable only made-up documents are shown');
 
 const browser = await launch(), failures = [];
 const context = {
@@ -33,7 +34,7 @@ const context = {
   calibration: calibrateDocument,
 };
 async function test(name, body) {
-  if (only && !name.includes(only)) return;
+  if (hasAll ? only && name.includes(only.slice(1)) : !name.includes(only)) return;
   const start = Date.now();
   try {
     await body(context);

@@ -280,6 +280,10 @@ std::optional<SmootherProblem> ObservationRecord::problem(
   if (!config.start && !has_target) {
     problem.gauge = PathGauge::similarity;
     rescale(problem);
+    if (start && !problem.start) {  // however often the filter began again: one camera is the world
+      problem.start = start;
+      problem.start->motion.world_from_cam = problem.world_from_cam.front();
+    }
   }
   problem.sigma_speed_m_s = config.sigma_speed_m_s;
   problem.sigma_rate_rad_s = config.sigma_rate_rad_s;

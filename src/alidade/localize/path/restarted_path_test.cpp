@@ -11,7 +11,7 @@ namespace {
 /// whole path is, and it cannot be solved.
 TEST(RestartedPath, IsSolvedWithoutATarget) {
   std::size_t num_restarts = 0;
-  for (const std::uint64_t seed : {3, 7, 9}) {
+  for (const std::uint64_t seed : {3U, 7U, 9U}) {
     UnderwaterScene world;
     world.camera = underwater_camera();
     world.num_points = 60;

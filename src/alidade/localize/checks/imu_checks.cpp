@@ -75,7 +75,15 @@ std::string imu_fault_text(const ImuEstimate& imu) {
 void add_imu(const Localization& report, Verdict& verdict) {
   if (!report.imu || report.imu->fault != ImuFault::none) return;
   const ImuEstimate& imu = *report.imu;
-  constexpr double many = 0.05, much = 3.0;
+  constexpr double many = 0.05, much = 3.0, apart = 3.5;
+  if (imu.gravity_sigmas > apart)
+    verdict.checks.push_back(
+        {"IMU scale factor", State::care,
+         fmt::format(
+             "by the IMU's forces gravity is {:.3f} m/s², not what it is ({:.2g}σ): their scale factor is off by "
+             "more than its σ, and the path's scale by as much; calibrate it, or give --sigma-accelerometer-scale",
+             imu.gravity_in_world.norm(), imu.gravity_sigmas),
+         imu.gravity_sigmas, apart, "σ", "path"});
   const double late = std::abs(imu.late_s);
   if (late > imu.frame_period_s)
     verdict.checks.push_back({"IMU clock", State::care,

@@ -38,6 +38,8 @@ struct ImuEstimate {
   Rigid3 cam_from_imu;
   Eigen::Vector3d sigma_rotation_rad = Eigen::Vector3d::Zero(), sigma_position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero(), sigma_gravity = Eigen::Vector3d::Zero();
+  double gravity_sigmas =
+      0.0;  ///< By how many of their σ gravity's size and the forces' scale factor are pulled apart.
   /// At the end, in the IMU's axes.
   Eigen::Vector3d rate_bias = Eigen::Vector3d::Zero(), sigma_rate_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d force_bias = Eigen::Vector3d::Zero(), sigma_force_bias = Eigen::Vector3d::Zero();

@@ -145,6 +145,20 @@ TEST(LocalizeImu, AClockThatIsOffIsFoundAndNamed) {
   EXPECT_NEAR(std::log(scale_of(result, run)), 0.0, 3.5 * result.imu->sigma_scale);
 }
 
+/// An accelerometer that reads 3 % too much is that much of the scale, ten times what was given of it.
+TEST(LocalizeImu, AScaleFactorThatIsOffIsNamed) {
+  for (const double factor : {1.0, 0.97, 1.03}) {
+    ImuRun run = swinging(4);
+    for (ImuReading& each : run.imu.readings) each.force_m_s2 *= factor;
+    const Localization result = localize(run.frames, run.camera, with_imu(run), {});
+    ASSERT_TRUE(result.imu);
+    const bool is_named = result.verdict.sentence.find("scale factor is off") != std::string::npos ||
+                          result.verdict.to_add.find("scale factor is off") != std::string::npos;
+    EXPECT_EQ(is_named, factor != 1.0) << factor << ": " << result.verdict.sentence << "; "
+                                       << result.imu->gravity_sigmas;
+  }
+}
+
 TEST(LocalizeImu, WithoutAMountingItsRotationIsFound) {
   const ImuRun run = swinging(2);
   LocalizeConfig config = with_imu(run);

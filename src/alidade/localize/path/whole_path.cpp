@@ -183,6 +183,12 @@ void fill_estimate(const SmoothedImu& found, ImuEstimate& estimate) {
   estimate.num_missing = found.num_missing;
 }
 
+/// Gravity and the scale factor explain each other's errors: as far as both are from what was given, they disagree.
+double gravity_sigmas(const ImuState& state, const Imu& given) {
+  return std::hypot((state.gravity_in_world.norm() - given.gravity_m_s2) / given.sigma_gravity_m_s2,
+                    state.force_scale / given.noise.sigma_force_scale);
+}
+
 /// Whether a path with an IMU is one: its scale is determined, and its noise not many times that of any.
 ImuFault fault_of(const SmoothedImu& found, bool is_in_metres) {
   constexpr double useless = 0.2, any_noise = 30.0;
@@ -211,7 +217,10 @@ double solve_with_imu(const Recording& recording, const LocalizeConfig& config, 
   Localization again = result;
   auto with_imu = smooth(problem, recording.frames.frames(), again);
   estimate.fault = with_imu && with_imu->imu ? fault_of(*with_imu->imu, is_in_metres) : ImuFault::unsettled;
-  if (with_imu && with_imu->imu) fill_estimate(*with_imu->imu, estimate);
+  if (with_imu && with_imu->imu) {
+    fill_estimate(*with_imu->imu, estimate);
+    estimate.gravity_sigmas = gravity_sigmas(with_imu->imu->state, *config.imu);
+  }
   if (estimate.fault != ImuFault::none) return 1.0;
   const SmoothedImu& found = *with_imu->imu;
   if (has_target) {

@@ -1,7 +1,10 @@
 #include "alidade/imu/preintegration.h"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/so3_jacobian.h"
 
 namespace alidade {
@@ -48,12 +51,9 @@ std::optional<ImuReading> reading_at(std::span<const ImuReading> readings, doubl
 }
 
 double usual_period_s(std::span<const ImuReading> readings) {
-  if (readings.size() < 2) return 0.0;
   std::vector<double> periods;
   for (std::size_t i = 1; i < readings.size(); ++i) periods.push_back(readings[i].t_s - readings[i - 1].t_s);
-  const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
-  std::ranges::nth_element(periods, middle);
-  return *middle;
+  return median_of(std::move(periods));
 }
 
 std::optional<ImuStep> preintegrated(std::span<const ImuReading> readings, double from_s, double to_s, double max_gap_s,

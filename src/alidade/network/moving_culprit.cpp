@@ -15,6 +15,7 @@ using PlacedStatus = MovingTargetReport::Status;
 struct Agreement {
   std::size_t num_placed = 0;
   double sigma_px = std::numeric_limits<double>::infinity();  ///< Root mean square of the cameras'.
+  double focal_sigmas = 0.0;                                  ///< By which a focal length is asked to be another, most.
 };
 
 Agreement agreement_of(const MovingTargetReport& report) {
@@ -26,6 +27,8 @@ Agreement agreement_of(const MovingTargetReport& report) {
     ++agreement.num_placed;
     sum2 += camera.sigma_px * camera.sigma_px;
   }
+  for (const FocalScore& focal : report.focals)
+    agreement.focal_sigmas = std::max(agreement.focal_sigmas, focal.sigmas());
   if (agreement.num_placed > 0) agreement.sigma_px = std::sqrt(sum2 / static_cast<double>(agreement.num_placed));
   return agreement;
 }
@@ -122,8 +125,10 @@ std::string culprit_of(const MovingTargetReport& report, std::span<const TargetO
   for (const auto& [a, b] : exchanges) {
     std::vector<RigHead> exchanged = given;
     std::swap(exchanged[a].camera, exchanged[b].camera);
-    best.consider(agreement_of(place(some, exchanged, doubtful)),
-                  "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
+    const Agreement agreement = agreement_of(place(some, exchanged, doubtful));
+    // One wrong file may fit another head better, and is as wrong there.
+    if (agreement.focal_sigmas > focal_limit) continue;
+    best.consider(agreement, "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
   }
   // By as much less is left as no chance would have it: of thousands of observations a hundredth would be.
   // Where one was not located at all, the others may have agreed well: so must all now.

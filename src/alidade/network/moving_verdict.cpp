@@ -105,10 +105,9 @@ void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
 
 /// The lens that the observations contradict most.
 void add_focals(const MovingTargetReport& report, Verdict& verdict) {
-  constexpr double limit = 4.2;  // as of a rig's causes
   if (report.focals.empty()) return;
   const FocalScore& most = *std::ranges::max_element(report.focals, {}, &FocalScore::sigmas);
-  const bool is_quiet = most.sigmas() < limit;
+  const bool is_quiet = most.sigmas() < focal_limit;
   const std::string text = is_quiet ? "no focal length is asked to be another"
                                     : "head " + std::to_string(report.cameras[most.head].id) +
                                           ": the observations ask for a focal length " +
@@ -116,7 +115,7 @@ void add_focals(const MovingTargetReport& report, Verdict& verdict) {
                                           (most.asked > 0.0 ? "longer" : "shorter") + " than its camera file's, by " +
                                           text_of(most.sigmas(), 2) + "σ: is the file of this lens at this zoom?";
   verdict.checks.push_back(
-      {"focal lengths", is_quiet ? State::good : State::care, text, most.sigmas(), limit, "σ", ""});
+      {"focal lengths", is_quiet ? State::good : State::care, text, most.sigmas(), focal_limit, "σ", ""});
 }
 
 void add_truth(const MovingTargetReport& report, Verdict& verdict) {

@@ -63,6 +63,9 @@ struct FocalScore {
   [[nodiscard]] double sigmas() const { return std::abs(asked) / std::hypot(sigma, given.value_or(0.0)); }
 };
 
+/// Beyond so many σ a focal length is said to be another, as a rig's causes are.
+constexpr double focal_limit = 4.2;
+
 struct MovingTargetReport {
   enum class Status {
     placed,

@@ -80,7 +80,7 @@ void add_imu(const Localization& report, Verdict& verdict) {
     verdict.checks.push_back(
         {"IMU scale factor", State::care,
          fmt::format(
-             "by the IMU's forces gravity is {:.3f} m/s², not what it is ({:.2g}σ): their scale factor is off by "
+             "by the IMU's forces gravity is {:.3f} m/s², not as given ({:.2g}σ): their scale factor is off by "
              "more than its σ, and the path's scale by as much; calibrate it, or give --sigma-accelerometer-scale",
              imu.gravity_in_world.norm(), imu.gravity_sigmas),
          imu.gravity_sigmas, apart, "σ", "path"});

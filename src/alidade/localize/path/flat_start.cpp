@@ -1,7 +1,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
+#include <utility>
 
+#include "alidade/estimation/median.h"
 #include "alidade/localize/path/path_resection.h"
 #include "alidade/localize/path/path_smoother.h"
 
@@ -20,10 +22,7 @@ double median_of_depths(const Rigid3& world_from_cam, std::span<const PlacedObse
     const double depth = (world_from_cam.inverse() * each.point_in_world).z();
     if (depth > 0.0) depths.push_back(depth);
   }
-  if (depths.empty()) return otherwise;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::ranges::nth_element(depths, middle);
-  return *middle;
+  return depths.empty() ? otherwise : median_of(std::move(depths));
 }
 
 void suppose(const Camera& camera, const Rigid3& world_from_cam, const UsedObservation& observation, double depth_m,

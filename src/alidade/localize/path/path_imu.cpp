@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/localize/imu/imu_alignment.h"
 #include "alidade/localize/path/path_system.h"
 
@@ -10,12 +11,6 @@
 
 namespace alidade {
 namespace {
-
-double upper_median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 constexpr double middle_of_three = 2.366;  // of χ² of three components, the median
 
@@ -52,7 +47,7 @@ void PathSmoother::leave_out_blows() {
       if (used[k]) all.push_back(sizes.back());
     }
     if (all.empty()) return;
-    const double limit = far * upper_median(std::move(all));
+    const double limit = far * median_of(std::move(all));
     for (std::size_t k = 0; k < used.size(); ++k) used[k] = used[k] && sizes[k] <= limit;
   };
   leave_out(rates_used_, [&](std::size_t k) { return Eigen::Vector3d(rates_at(state_, k).error); });
@@ -144,7 +139,7 @@ bool PathSmoother::choose_steps() {
     for (std::size_t k = 0; k < num; ++k)
       if (has(k)) all.push_back(chi2_of(k));
     if (all.empty()) return;
-    const double larger = std::max(1.0, upper_median(all) / middle_of_three);
+    const double larger = std::max(1.0, median_of(all) / middle_of_three);
     constexpr double same = 1.1;
     is_other = is_other || larger > same * noise || noise > same * larger;
     noise = larger;

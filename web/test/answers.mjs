@@ -79,6 +79,15 @@ async function halvesDoNotContradictTheHeader({open, url, calibration}) {
   assert.match(words, /They do not: halves differ by 4\.8σ in fy/);
 }
 
+/** A rate is no time: what ends in _rad_s stood there in seconds. */
+async function unitsAreThoseOfTheNames({open, url, documents}) {
+  const document = structuredClone(documents.servo.document);
+  Object.assign(document, {command: 'localize', data: {}, estimate: {imu: {gyro_bias_rad_s: [0.01, 0, 0], accelerometer_bias_m_s2: [0.5, 0, 0]}, ate_m: 0.25}});
+  const {page, close} = await open(url(document)), words = (await page.locator('#fig-estimate').innerText()).replace(/\s+/g, ' ');
+  await close();
+  for (const wanted of [/gyro bias x 0\.573\d* °\/s/, /accelerometer bias x 0\.5\d* m\/s²/, /ATE 250 mm/]) assert.match(words, wanted);
+}
+
 async function aRefusalShowsCornersAsFound({open, url, calibration}) {
   const document = calibration(2);
   Object.assign(document.verdict, {state: 'refused', exit_code: 4, sentence: 'only 2 usable photos of the board; it takes 3', to_add: 'add photos of the board'});
@@ -174,6 +183,7 @@ export const tests = {
   'what was assumed is said': whatWasAssumedIsSaid,
   'causes are named, worst first': causesAreNamedWorstFirst,
   'halves do not contradict the header': halvesDoNotContradictTheHeader,
+  'units are those of the names': unitsAreThoseOfTheNames,
   'a refusal shows corners as found': aRefusalShowsCornersAsFound,
   'exit code 6 is a triangle': exitCodeSixIsATriangle,
   'many events leave the plot free': manyEventsLeaveThePlotFree,

@@ -197,7 +197,7 @@ imu.
   gravity_in_world_m_s2[3]        m/s2   gravity in the path's frame
   gyro_bias_rad_s[3]              rad/s  of its rates, at the end, in its axes
   accelerometer_bias_m_s2[3]      m/s2   of its forces, at the end, in its axes
-  imu_in_cam_m[3]                 m      its place in the camera
+  position_in_cam_m[3]                 m      its place in the camera
   cam_from_imu_quaternion_wxyz[4]  1      its rotation
   cam_from_imu_rad[3]             rad    under stddev: σ of the rotation
   clock_s                         s      its clock less the camera's

@@ -161,7 +161,7 @@ void fill_imu(const ImuEstimate& imu, ResultDocument& document) {
   add("gravity_in_world_m_s2", imu.gravity_in_world, imu.sigma_gravity);
   add("gyro_bias_rad_s", imu.rate_bias, imu.sigma_rate_bias);
   add("accelerometer_bias_m_s2", imu.force_bias, imu.sigma_force_bias);
-  add("imu_in_cam_m", imu.cam_from_imu.translation, imu.sigma_position_m);
+  add("position_in_cam_m", imu.cam_from_imu.translation, imu.sigma_position_m);
   const Eigen::Quaterniond& q = imu.cam_from_imu.rotation;
   estimate["cam_from_imu_quaternion_wxyz"] = JsonValue::list();
   for (const double each : {q.w(), q.x(), q.y(), q.z()}) estimate["cam_from_imu_quaternion_wxyz"].push_back(each);

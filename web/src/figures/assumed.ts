@@ -2,9 +2,8 @@
 import type {Assumed, Doc} from '../core/document';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
-import {degrees, num} from '../core/format';
+import {num, units} from '../core/format';
 
-const units: [string, string, number][] = [['_m_s2', 'm/s²', 1], ['_m_s', 'm/s', 1], ['_px', 'px', 1], ['_rad', '°', degrees], ['_deg', '°', 1], ['_s', 's', 1], ['_m', 'm', 1]];
 
 /** The name without its unit, and the unit; some stand with a place behind them: "origin_m z". */
 function plain(name: string): {words: string; unit: string; factor: number} {

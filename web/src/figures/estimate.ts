@@ -4,7 +4,7 @@ import {css, diverging, onto} from '../core/colours';
 import type {Doc, Quantity} from '../core/document';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
-import {degrees, num, shortened, times, valueText} from '../core/format';
+import {num, shortened, times, valueText, units} from '../core/format';
 import type {Correlations} from './correlations';
 
 interface Reading {
@@ -14,7 +14,6 @@ interface Reading {
 }
 
 const lensPixels = new Set(['fx', 'fy', 'cx', 'cy', 'skew', 'width', 'height']);
-const units: [string, string, number][] = [['_m_s2', 'm/s²', 1], ['_m_s', 'm/s', 1], ['_px', 'px', 1], ['_rad', '°', degrees], ['_deg', '°', 1], ['_s', 's', 1], ['_m', 'm', 1]];
 
 const mostAtOnce = 13; // rows; the others are a click away
 

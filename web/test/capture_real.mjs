@@ -41,7 +41,8 @@ async function realPhotosGiveTheCameraOfTheBatch(alidade, name, files, board) {
   try {
     const run = await started(alidade, ['--until', '0.001px'], name, ['calibrate', ...board]), shown = await opened(browser, run.url);
     await shown.becomes('looking');
-    await sleep(1e3 * files.length); // one round
+    // One that brings less than half of what was asked for is waited for, up to 12 s.
+    await until('three photos by itself', async () => (await shown.photos()) >= 3, 60_000);
     const byItself = await shown.photos();
     for (let i = 0; i < files.length; ++i) { // in the next one each is taken by hand
       await shown.page.keyboard.press(' ');
@@ -53,7 +54,7 @@ async function realPhotosGiveTheCameraOfTheBatch(alidade, name, files, board) {
     assert.deepEqual(shown.faults, []);
     const kept = readdirSync(at(name, 'photos')).sort();
     console.log(`      ${name}: ${byItself} photos taken automatically, ${kept.length} in all, of ${planes.size}`);
-    assert.ok(byItself >= 3 && kept.length >= 0.8 * files.length, `${byItself}, ${kept.length}`);
+    assert.ok(kept.length >= 0.8 * files.length, `${kept.length}`);
     for (const one of kept) assert.ok(planes.has(hash(greyOf(at(name, 'photos', one)).grey)), `${one} is no frame of the film`);
     assert.equal(readFileSync(at(name, 'camera.yaml'), 'utf8'), batch(alidade, at(name, 'photos'), board, `${name}-batch`));
     await shown.close();

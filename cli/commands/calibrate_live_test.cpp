@@ -156,12 +156,15 @@ TEST(KeptPhotos, AreNeverRenumbered) {
     photos.add(grey, 1.5, true);
     EXPECT_TRUE(photos.undo());
     EXPECT_EQ(photos.add(grey, 2.5, false).file, "000003.png");
+    photos.add(grey, 3.5, true);
+    EXPECT_TRUE(photos.undo());
   }
-  const live::KeptPhotos again(folder, true);
+  live::KeptPhotos again(folder, true);
   ASSERT_EQ(again.photos().size(), 2u);
   EXPECT_EQ(again.photos()[1].file, "000003.png");
   EXPECT_DOUBLE_EQ(again.photos()[1].t_s, 2.5);
   EXPECT_FALSE(again.photos()[1].is_exact);
+  EXPECT_EQ(again.add(grey, 4.5, true).file, "000005.png");
   EXPECT_THROW(live::KeptPhotos(folder, false), InputError);
   fs::remove_all(folder);
   EXPECT_THROW(live::KeptPhotos(folder, true), InputError);

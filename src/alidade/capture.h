@@ -89,7 +89,7 @@ struct CaptureState {
   std::optional<int> photos_to_goal;                   ///< Likely still needed, if the outlines are followed.
   std::optional<NextPose> next;
   PixelGrid sigma;                    ///< σ over the image [px]; no values before there is a camera.
-  std::vector<std::string> warnings;  ///< "the focal length walks: …"
+  std::vector<std::string> warnings;  ///< "the focal length drifts: …"
   [[nodiscard]] bool is_at(double goal_px) const { return has_camera && worst_3sigma_px <= goal_px; }
 };
 

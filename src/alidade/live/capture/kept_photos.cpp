@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 #include <opencv2/core/mat.hpp>
 
 #include "alidade/files/csv.h"
@@ -32,6 +33,13 @@ std::vector<std::string> files_in(const std::filesystem::path& folder) {
   return files;
 }
 
+/// The last number that was given in a folder, where its photo was forgotten since; else 0.
+int last_forgotten(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  int number = 0;
+  return stream >> number && number > 0 ? number : 0;
+}
+
 }  // namespace
 
 KeptPhotos::KeptPhotos(std::filesystem::path folder, bool goes_on) : folder_(std::move(folder)) {
@@ -52,6 +60,7 @@ KeptPhotos::KeptPhotos(std::filesystem::path folder, bool goes_on) : folder_(std
       photos_.push_back({file, csv.number(row, "t_s"), csv.text(row, "exact") == "1"});
     }
   }
+  last_number_ = std::max(last_number_, last_forgotten(forgotten_file()));
   // Killed between a photo and its row: the photo counts.
   for (const std::string& file : files) {
     last_number_ = std::max(last_number_, number_of(file));
@@ -71,6 +80,7 @@ const KeptPhoto& KeptPhotos::add(const cv::Mat& grey, double t_s, bool is_exact)
 
 bool KeptPhotos::undo() {
   if (photos_.empty()) return false;
+  write_file(forgotten_file(), fmt::format("{}\n", last_number_));  // so that --resume does not give it again
   std::error_code ignored;
   std::filesystem::remove(path_of(photos_.back()), ignored);
   photos_.pop_back();

@@ -156,6 +156,12 @@ async function theKeyboardAloneSteersIt({alidade}) {
     const second = await opened(browser, run.url);
     await second.becomes('watching');
     assert.ok(await second.page.isDisabled('#take'));
+    assert.match(await second.page.textContent('.capture-none'), /in the page in control/);
+    await second.page.keyboard.press('?');
+    const keys = await second.page.locator('dialog.help kbd').allTextContents();
+    assert.deepEqual(keys, ['space', 'u', 'p', 'Enter', 'm', 'd', 'Esc', '?']);
+    await second.page.keyboard.press('Escape');
+    assert.ok(!(await second.page.locator('dialog.help').isVisible()));
     await until('it watches', async () => (await second.photos()) === (await shown.photos()));
     assert.deepEqual(second.faults, []);
     await second.close();

@@ -85,6 +85,7 @@ async function aKilledRunGoesOnWithEveryPhoto({alidade}) {
     await until('three photos', async () => (await shown.photos()) >= 3);
     await run.end(); // kill -9
     await shown.becomes('lost');
+    assert.equal(await shown.page.textContent('.capture-advice'), 'nothing is taken any more');
     await shown.close();
     const kept = readdirSync(at('killed', 'photos')).sort(), bytes = kept.map((name) => hash(readFileSync(at('killed', 'photos', name))));
     const again = await started(alidade, ['--until', '0.001px', '--resume', at('killed')], 'killed', undefined, true);

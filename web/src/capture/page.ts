@@ -5,7 +5,7 @@ import {readDocument, type Doc} from '../core/document';
 import {button, el} from '../core/dom';
 import {num} from '../core/format';
 import {findPictures} from '../core/images';
-import {redrawAll, showHelp, toggleTheme} from '../page/keys';
+import {redrawAll, showHelp, toggleTheme, type KeyHelp} from '../page/keys';
 import {Camera} from './camera';
 import {connect, type Line, type Look, type State, type Told} from './messages';
 import {CameraView} from './picture';
@@ -18,6 +18,10 @@ const looks: Record<Stage, [string, string, string]> = {
 };
 const least_ms = 70; // between two pictures: the page and the solver share a machine
 const mostNotes = 4;
+
+const boardKeys: KeyHelp = [['space', 'take the image as it is'], ['u', 'undo: forget the last photo'], ['p', 'pause: nothing is taken automatically; again: go on']];
+const shotKeys: KeyHelp = [['space', 'to the field of the reading'], ['Enter', 'in that field: take the image with the reading'], ['u', 'undo: forget the last shot']];
+const bothKeys: KeyHelp = [['Enter', 'end: what was taken is calibrated'], ['m', 'the image as in a mirror'], ['d', 'dark or light'], ['Esc', 'close this help'], ['?', 'this help']];
 
 function moreWords(needed: number): string {
   return needed > 200 ? 'hundreds of photos more' : `about ${needed} more photo${needed === 1 ? '' : 's'}`;
@@ -83,7 +87,7 @@ class CapturePage {
     };
     this.header = el('header', {class: 'top live'},
       el('div', {class: 'headline'}, el('h1', {}, this.symbol, ' ', this.word, ' ', this.facts),
-        el('div', {class: 'buttons'}, this.again, button('?', 'Keys and help', showHelp), button('◐', 'Dark or light', toggleTheme))),
+        el('div', {class: 'buttons'}, this.again, button('?', 'Keys and help', () => this.help()), button('◐', 'Dark or light', toggleTheme))),
       el('p', {class: 'counts'}, el('b', {}, `alidade ${isShots ? 'rangefinder' : 'calibrate'} --live`), ` · board ${this.about.board.cols}×${this.about.board.rows}${this.goalWords()}`), this.notes);
     const mapBody = el('div', {class: 'body'}), main = el('main'), {take, undo, pause, mirror, end} = this.buttons;
     const buttons = isShots ? [el('label', {class: 'capture-reading'}, 'reading ', this.reading, ' m'), take, undo, end, mirror] : Object.values({take, undo, pause, end, mirror});
@@ -122,6 +126,9 @@ class CapturePage {
     if (!this.isShots) return ` · goal 3σ ≤ ${num(this.about.until, 3)} px at the worst pixel`;
     return this.about.until > 0 ? ` · goal 3σ ≤ ${num(this.about.until, 3)} mm at the origin` : '';
   }
+  private help(): void {
+    showHelp([...(this.isShots ? shotKeys : boardKeys), ...bothKeys], 'Every photo that was taken is on disk: a run that was ended or lost goes on with --resume. “±” is 3σ everywhere.');
+  }
   /** A photo; of a rangefinder with what it reads, once. */
   private take(): void {
     if (!this.isShots) return this.line.ask('take');
@@ -139,11 +146,22 @@ class CapturePage {
     this.set('lost');
     this.note(`▲ ${words}`, 'warning');
     this.finishCamera();
+    this.finishGuidance('nothing is taken any more');
   }
   private finishCamera(): void {
     this.camera?.stop();
     this.camera = null;
     this.answered?.();
+  }
+
+  private isDone(): boolean {
+    return this.stage === 'goal' || this.stage === 'ended' || this.stage === 'lost';
+  }
+  /** No image comes any more: nothing is to be filled. */
+  private finishGuidance(words: string): void {
+    this.view.finish();
+    this.target.textContent = '';
+    this.advise(words);
   }
 
   private hear(message: Told): void {
@@ -154,13 +172,16 @@ class CapturePage {
     if (message.op === 'note') return this.note(message.words);
     if (message.op === 'goal') {
       if (message.holds) this.set('goal');
-      return this.advise(message.holds ? 'the goal is reached: the report follows' : 'calibrating: the report follows');
+      return this.finishGuidance(message.holds ? 'the goal is reached: the report follows' : 'calibrating: the report follows');
     }
     void this.end(message.report);
   }
   private async control(isOurs: boolean): Promise<void> {
     this.hasControl = isOurs;
-    if (!isOurs) return this.set('watching');
+    if (!isOurs) {
+      if (this.view.video) this.view.say('the camera’s image is in the page in control');
+      return this.set('watching');
+    }
     if (this.about.source !== 'browser') return this.set(this.state?.paused ? 'paused' : 'looking');
     await this.openCamera();
   }
@@ -223,12 +244,12 @@ class CapturePage {
     this.goal.textContent = worst === null
       ? 'a few photos first: there is no camera yet'
       : worst <= this.about.until ? `at the goal of ${num(this.about.until, 3)} px` : `3σ at the worst pixel; the goal is ${num(this.about.until, 3)} px${needed ? `, ${moreWords(needed)}` : ''}`;
-    const next = state?.next;
+    const next = this.isDone() ? null : state?.next;
     this.target.textContent = next ? `Next: ${this.view.isMirrored ? next.words_mirrored : next.words}. Fill the outline.` : '';
     this.map.redraw();
   }
   private showShots(): void {
-    const state = this.state, shots = state?.photos ?? 0, next = state?.next;
+    const state = this.state, shots = state?.photos ?? 0, next = this.isDone() ? null : state?.next;
     this.facts.textContent = `· ${shots} shot${shots === 1 ? '' : 's'}`;
     this.figure.textContent = state?.worst == null ? '–' : `${num(state.worst, 2)} mm`;
     this.goal.textContent = shots === 0 ? 'no shot yet' : state?.sentence ?? '';
@@ -237,11 +258,12 @@ class CapturePage {
   }
   private takeLook(look: Look): void {
     this.answered?.();
+    if (this.isDone()) return;
     this.view.takeLook(look);
     if (this.hasControl === false || this.about.source !== 'browser') this.root.dataset['exact'] = look.exact ? '1' : '0';
     const words = this.view.isMirrored ? look.words_mirrored : look.words;
     if (this.isShots) return this.advise(words);
-    this.advise(look.sight === 'useful' ? (this.state?.paused ? 'worth taking: space takes it' : 'taken') : look.sight === 'moving' ? words || 'hold it still' : words === 'as outlined' ? 'hold it still' : words);
+    this.advise(look.sight === 'useful' ? (!this.state?.paused ? 'taken' : this.hasControl === false ? 'worth taking' : 'worth taking: space takes it') : look.sight === 'moving' ? words || 'hold it still' : words === 'as outlined' ? 'hold it still' : words);
   }
   private advise(words: string): void {
     if (this.advice.textContent !== words) this.advice.textContent = words;
@@ -315,7 +337,7 @@ class CapturePage {
     const press = (one: HTMLButtonElement) => !one.disabled && one.click();
     const keys: Record<string, () => void> = {
       ' ': () => (this.isShots ? this.reading.focus() : press(this.buttons.take)), Enter: () => press(this.buttons.end), u: () => press(this.buttons.undo), p: () => press(this.buttons.pause),
-      m: () => press(this.buttons.mirror), d: toggleTheme, '?': showHelp, Escape: () => document.querySelector<HTMLDialogElement>('dialog.help[open]')?.close(),
+      m: () => press(this.buttons.mirror), d: toggleTheme, '?': () => this.help(), Escape: () => document.querySelector<HTMLDialogElement>('dialog.help[open]')?.close(),
     };
     document.addEventListener('keydown', (event) => {
       const target = event.target as HTMLElement | null;

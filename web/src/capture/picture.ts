@@ -15,6 +15,7 @@ export class CameraView {
   private look: Look | null = null;
   private state: State | null = null;
   private flashed_ms = -1e9;
+  private isFinished = false;
   isMirrored = false;
   drawings = 0; // for tests
 
@@ -34,6 +35,11 @@ export class CameraView {
   }
   takeState(state: State): void {
     this.state = state;
+    this.draw();
+  }
+  /** Neither outline nor corners any more. */
+  finish(): void {
+    this.isFinished = true;
     this.draw();
   }
   mirror(isMirrored: boolean): void {
@@ -65,7 +71,7 @@ export class CameraView {
     this.over.width = Math.round(w * ratio);
     this.over.height = Math.round(h * ratio);
     const g = this.over.getContext('2d')!;
-    if (!size || !(size.width > 0)) return;
+    if (this.isFinished || !size || !(size.width > 0)) return;
     const s = Math.min(w / size.width, h / size.height), left = (w - s * size.width) / 2, top = (h - s * size.height) / 2;
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
     const x = (u: number) => this.isMirrored ? w - left - s * (u + 0.5) : left + s * (u + 0.5), y = (v: number) => top + s * (v + 0.5);

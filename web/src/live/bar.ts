@@ -39,7 +39,7 @@ export class LiveBar {
     choice(spans, 'how much is shown', ['10 s', '60 s', 'all'], (i) => look([10, 60, 0][i]!));
     this.element = el('header', {class: 'top live'},
       el('div', {class: 'headline'}, el('h1', {}, this.symbol, ' ', this.word, ' ', this.facts),
-        el('div', {class: 'buttons'}, this.held, spans, button('?', 'Keys and help', showHelp), button('◐', 'Dark or light', toggleTheme))),
+        el('div', {class: 'buttons'}, this.held, spans, button('?', 'Keys and help', () => showHelp()), button('◐', 'Dark or light', toggleTheme))),
       this.more, this.logged);
     this.setState('connecting', '');
   }

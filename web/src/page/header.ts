@@ -75,7 +75,7 @@ export function header(doc: Doc, ids: Set<string>): HTMLElement {
     el('div', {class: 'headline'},
       el('h1', {class: sentence.length > 130 ? 'long' : null}, el('span', {class: 'symbol', role: 'img', 'aria-label': `state: ${word}`}, look.symbol), ' ',
         el('span', {class: 'word'}, isSaid ? doc.sentence.slice(0, word.length) : word), doc.sentence ? sentence : ''),
-      el('div', {class: 'buttons'}, button('?', 'Keys and help', showHelp), button('◐', 'Dark or light', toggleTheme),
+      el('div', {class: 'buttons'}, button('?', 'Keys and help', () => showHelp()), button('◐', 'Dark or light', toggleTheme),
         button('⤓ result.json', 'Download the numbers', () => download('result.json', 'application/json', doc.source)))),
     el('p', {class: 'counts'}, el('b', {}, `alidade ${doc.command}`), counts.length > 0 ? ' · ' + counts.join(' · ') : ''),
     next ? el('p', {class: 'to-do'}, el('b', {}, doc.toAdd ? 'What to do: ' : 'Next: '), ...withCode(next)) : null,

@@ -10,24 +10,23 @@ import {toggleFull, toggleTable, type Card} from './card';
 import {savePicture} from './picture_file';
 import type {Doc} from '../core/document';
 
-const help: [string, string][] = [
+export type KeyHelp = [string, string][];
+const reportKeys: KeyHelp = [
   ['← →  or  j k', 'another photo, shot or view, worst first'], ['0', 'views as they were'], ['d', 'dark or light'],
   ['f', 'figure in the full window, and back'], ['s', 'save the figure as PNG'], ['t', 'the table behind the figure'],
   ['c', 'copy the value at the cursor'], ['Esc', 'close this help; leave the full window'], ['space', 'hold the figures while a run is live'], ['?', 'this help'],
   ['drag', 'zoom into a time axis (double click: all); turn a 3-D view (shift: move it)'],
 ];
 
-export function showHelp(): void {
-  let box = document.querySelector<HTMLDialogElement>('dialog.help');
-  if (!box) {
-    box = el('dialog', {class: 'help', 'aria-label': 'Keys'}, el('h2', {}, 'Keys'),
-      el('table', {}, ...help.map(([key, words]) => el('tr', {}, el('td', {}, el('kbd', {}, key)), el('td', {}, words)))),
-      el('p', {class: 'good'}, 'A key acts on the figure under the pointer. Bands, ellipses and “±” are 3σ everywhere.'));
-    box.addEventListener('click', () => box?.close());
-    document.body.append(box);
-  }
-  if (box.open) box.close();
-  else box.showModal();
+/** Of the page that is shown: a capture has keys of its own, and becomes a report. */
+export function showHelp(keys = reportKeys, remark = 'A key acts on the figure under the pointer. Bands, ellipses and “±” are 3σ everywhere.'): void {
+  if (closeHelp()) return;
+  const box = el('dialog', {class: 'help', 'aria-label': 'Keys'}, el('h2', {}, 'Keys'),
+    el('table', {}, ...keys.map(([key, words]) => el('tr', {}, el('td', {}, el('kbd', {}, key)), el('td', {}, words)))), el('p', {class: 'good'}, remark));
+  box.addEventListener('click', () => box.close());
+  document.querySelector('dialog.help')?.remove();
+  document.body.append(box);
+  box.showModal();
 }
 
 /** Whether there was one to close. */
@@ -66,7 +65,7 @@ export function listenToKeys(doc: Doc, selection: Selection, cards: Card[], sign
   const actions: Record<string, () => void> = {
     ArrowRight: () => selection.step(1), j: () => selection.step(1),
     ArrowLeft: () => selection.step(-1), k: () => selection.step(-1),
-    '0': resetAll, d: toggleTheme, '?': showHelp,
+    '0': resetAll, d: toggleTheme, '?': () => showHelp(),
     f: () => active && toggleFull(active),
     t: () => active && toggleTable(active),
     s: () => active && savePicture(active, doc),

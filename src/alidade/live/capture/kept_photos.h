@@ -35,7 +35,7 @@ class KeptPhotos {
 
  private:
   void write_table() const;
-  [[nodiscard]] std::filesystem::path forgotten_file() const { return folder() / ".last_number"; }
+  [[nodiscard]] std::filesystem::path forgotten_file() const { return folder_ / ".last_number"; }
 
   std::filesystem::path folder_;
   std::vector<KeptPhoto> photos_;

@@ -88,6 +88,39 @@ class Names(unittest.TestCase):
         self.assertEqual(outcome("check_names.py", {"a/x.h": "struct Fit {\n", "testing/y.h": "struct Fit {\n"})[0], 0)
 
 
+class Docs(unittest.TestCase):
+    FILES = {"src/alidade/a/b_test.cpp": "TEST(Suite, OneThing) {\n", "src/alidade/a/b.cpp": "", "other.md": "# A heading, here\n"}
+
+    def assert_refused(self, line, fault):
+        self.assertEqual(outcome("check_docs.py", {**self.FILES, "docs/page.md": line}), (1, f"docs/page.md:1: {fault}\n"), line)
+
+    def assert_allowed(self, line):
+        self.assertEqual(outcome("check_docs.py", {**self.FILES, "docs/page.md": line})[0], 0, line)
+
+    def test_links_lead_somewhere(self):
+        self.assert_refused("[x](gone.md)", "links to gone.md, which is not there")
+        self.assert_refused("[x](../other.md#a-word)", "links to #a-word, which other.md does not have")
+        self.assert_allowed("[x](../other.md#a-heading-here) and [y](https://example.com/gone.md)")
+
+    def test_files_are_there(self):
+        self.assert_refused("see `a/c.cpp`", "names a/c.cpp, which is not there")
+        self.assert_allowed("see `a/b.cpp`, `b.cpp`, `x_test.cpp`, `ROOM.h`, `out/track.csv`")
+
+    def test_tests_are_there(self):
+        self.assert_refused("`Suite.Another`", "names the test Suite.Another, which is not there")
+        self.assert_refused("`…Another…`", "names the test …Another…, which is not there")
+        self.assert_allowed("`Suite.OneThing`, `Suite.*`, `Suite.One…`, `…Thing…`, `Other.Word`")
+
+    def test_options_are_of_their_command(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = pathlib.Path(folder) / "alidade"
+            program.write_text("#!/bin/sh\ncase $1 in go) echo '  --fast N';; *) printf 'Subcommands:\\n  go   Goes\\n';; esac\n")
+            program.chmod(0o755)
+            (pathlib.Path(folder) / "page.md").write_text("`alidade go x --fast 3` and `alidade go --faster`\n")
+            done = subprocess.run([sys.executable, TOOLS / "check_docs.py", folder, program], capture_output=True, text=True, check=False)
+        self.assertEqual((done.returncode, done.stdout), (1, "page.md:1: alidade go has no --faster\n"))
+
+
 class Frames(unittest.TestCase):
     def assert_refused(self, line, message):
         self.assertEqual(outcome("check_frames.py", {"a.cpp": line}), (1, f"a.cpp:1: {message}\n"), line)

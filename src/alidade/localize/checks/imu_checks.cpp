@@ -38,6 +38,9 @@ std::string imu_fault_text(const ImuEstimate& imu) {
       return "";
     case ImuFault::other_time:
       return "none of the IMU's readings is of the time of the path (t_s)";
+    case ImuFault::few:
+      return "too few of the IMU's readings are of the time of the path, between gaps: a scale needs some three "
+             "seconds";
     case ImuFault::rate_degrees:
       return "the IMU's angular rates are in degrees per second, not rad/s";
     case ImuFault::rate_unit:

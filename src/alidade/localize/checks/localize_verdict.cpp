@@ -53,6 +53,7 @@ void add_truth(const Localization& report, Verdict& verdict) {
       {"truth", state_of(ratio, care_ratio, bad_ratio),
        "the path is " + text_of(ratio, 2) + " times its σ from the truth, after the best alignment", ratio, care_ratio,
        "σ", "path"});
+  if (!report.has_target) return;  // the world is the first camera's: no truth stands in it
   const double before = error.unaligned_m / error.stated_m;
   if (report.scale_known && before > elsewhere_ratio)
     verdict.checks.push_back({"truth's frame", State::care,

@@ -171,7 +171,7 @@ ImuFault find_scale(const Imu& imu, std::span<const ImuReading> readings, std::s
                     ImuEstimate& estimate) {
   std::vector<AlignmentRow> rows = rows_of(readings, path, estimate.rate_bias, estimate.cam_from_imu.translation);
   constexpr std::size_t enough = 8;
-  if (rows.size() < enough) return ImuFault::other_time;
+  if (rows.size() < enough) return ImuFault::few;
   auto found = fit(rows, imu, Gravity::free, nullptr);
   if (!found) return undetermined(rows);
   constexpr double certain = 5.0;
@@ -206,7 +206,7 @@ ImuAlignment align_imu(const Imu& imu, std::span<const TimedPose> path) {
   ImuAlignment out;
   ImuEstimate& estimate = out.estimate;
   if (path.size() < 3 || imu.readings.size() < 3) {
-    estimate.fault = ImuFault::other_time;
+    estimate.fault = ImuFault::few;
     return out;
   }
   const std::optional<double> mean = mean_force(imu, path);

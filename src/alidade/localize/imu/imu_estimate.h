@@ -12,7 +12,8 @@ ALIDADE_PUBLIC_BEGIN
 /// Why an IMU's readings have no part in a path.
 enum class ImuFault {
   none,
-  other_time,    ///< None of them is of the time of the path.
+  other_time,    ///< None of them is of the time of the path,
+  few,           ///< or too few, between gaps.
   rate_degrees,  ///< Angular rates are in degrees per second,
   rate_unit,     ///< or larger than the camera's by another factor.
   mirrored,      ///< The axes are left-handed: one has the wrong sign, or two are exchanged.

@@ -82,6 +82,8 @@ TEST(LocalizeImu, GivesMetresGravityAndItsOwnErrorsWithoutATarget) {
     num_used += 1.0;
     EXPECT_TRUE(result.is_scale_read);
     EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+    // The truth stands in a frame of its own: nothing says where a camera begins.
+    EXPECT_EQ(result.verdict.sentence.find("another frame"), std::string::npos) << result.verdict.sentence;
     const ImuEstimate& imu = *result.imu;
     const double off = std::log(scale_of(result, run));
     RecordProperty("scale_percent_" + std::to_string(seed), std::to_string(100.0 * off));
@@ -220,6 +222,10 @@ TEST(LocalizeImu, FaultsAreNamedAndNotUsed) {
   EXPECT_EQ(fault_of([&](Imu& imu) { imu.mounting->cam_from_imu.rotation = Eigen::Quaterniond::Identity(); }),
             ImuFault::mounting);
   EXPECT_EQ(fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { r.t_s += 1e9; }); }), ImuFault::other_time);
+  EXPECT_EQ(fault_of([&](Imu& imu) {
+              std::erase_if(imu.readings, [](const ImuReading& r) { return r.t_s < 2.0 || r.t_s > 3.5; });
+            }),
+            ImuFault::few);
   EXPECT_EQ(
       fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { std::swap(r.force_m_s2.x(), r.force_m_s2.z()); }); }),
       ImuFault::misfit);

@@ -6,36 +6,47 @@
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/localize/imu/imu_alignment.h"
 
 namespace alidade {
 namespace {
 
-/// ∫ rate dt from the first reading on, and so its mean between any two times.
+/// ∫ rate dt from the first reading on, and so its mean between any two times without a gap between them.
 class RateIntegral {
  public:
   explicit RateIntegral(std::span<const ImuReading> readings) : readings_(readings) {
-    sums_.push_back(Eigen::Vector3d::Zero());
-    for (std::size_t i = 1; i < readings.size(); ++i)
-      sums_.push_back(sums_.back() + 0.5 * (readings[i].t_s - readings[i - 1].t_s) *
-                                         (readings[i].rate_rad_s + readings[i - 1].rate_rad_s));
+    const double max_gap_s = max_imu_gap_s(readings);
+    sums_.push_back({});
+    for (std::size_t i = 1; i < readings.size(); ++i) {
+      const double h = readings[i].t_s - readings[i - 1].t_s;
+      const Eigen::Vector3d twice = readings[i].rate_rad_s + readings[i - 1].rate_rad_s;
+      sums_.push_back({sums_.back().angle + 0.5 * h * twice, sums_.back().num_gaps + (h > max_gap_s ? 1 : 0)});
+    }
   }
   [[nodiscard]] std::optional<Eigen::Vector3d> mean(double from_s, double to_s) const {
     const auto begin = at(from_s), end = at(to_s);
-    if (!begin || !end) return std::nullopt;
-    return Eigen::Vector3d((*end - *begin) / (to_s - from_s));
+    if (!begin || !end || begin->num_gaps != end->num_gaps) return std::nullopt;
+    return Eigen::Vector3d((end->angle - begin->angle) / (to_s - from_s));
   }
 
  private:
-  [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const {
+  struct Sum {
+    Eigen::Vector3d angle = Eigen::Vector3d::Zero();
+    std::size_t num_gaps = 0;
+  };
+  /// None within a gap.
+  [[nodiscard]] std::optional<Sum> at(double t_s) const {
     const auto after = std::ranges::upper_bound(readings_, t_s, {}, &ImuReading::t_s);
     if (after == readings_.begin() || after == readings_.end()) return std::nullopt;
+    const auto i = static_cast<std::size_t>(after - readings_.begin());
+    if (sums_[i].num_gaps != sums_[i - 1].num_gaps) return std::nullopt;
     const ImuReading &a = *(after - 1), &b = *after;
     const double h = b.t_s - a.t_s, s = t_s - a.t_s;
     const Eigen::Vector3d rate = a.rate_rad_s + 0.5 * s / h * (b.rate_rad_s - a.rate_rad_s);
-    return Eigen::Vector3d(sums_[static_cast<std::size_t>(after - readings_.begin()) - 1] + s * rate);
+    return Sum{sums_[i - 1].angle + s * rate, sums_[i - 1].num_gaps};
   }
   std::span<const ImuReading> readings_;
-  std::vector<Eigen::Vector3d> sums_;
+  std::vector<Sum> sums_;
 };
 
 /// The camera's mean rate in an interval.

@@ -128,8 +128,8 @@ FieldList fields_of(LocalizeArgs& args) {
        .value = &args.imu,
        .help =
            "Readings of an inertial measurement unit fixed to the camera, CSV: t_s,omega_x_rad_s,omega_y_rad_s,"
-           "omega_z_rad_s,force_x_m_s2,force_y_m_s2,force_z_m_s2 (at rest +9.81 upwards), in its own axes: metres and "
-           "the direction of gravity without a target, else a check of its scale",
+           "omega_z_rad_s,force_x_m_s2,force_y_m_s2,force_z_m_s2 (at rest +9.81 upwards), or EuRoC's imu0/data.csv, in "
+           "its own axes: metres and the direction of gravity without a target, else a check of its scale",
        .form = "FILE"},
       {.name = "imu_mounting",
        .value = &args.imu_mounting,
@@ -182,7 +182,8 @@ void read_values(LocalizeArgs& args) {
   if (args.imu.empty() && !args.imu_mounting.empty()) throw UsageError("--imu-mounting needs --imu");
   if (!args.imu.empty()) {
     args.config.imu = args.imu_values;
-    args.config.imu->readings = read_imu(args.imu, args.skip_bad, &args.skipped);
+    const std::int64_t origin_ns = args.is_images() ? origin_ns_of(args.sequence) : 0;
+    args.config.imu->readings = read_imu(args.imu, args.skip_bad, &args.skipped, origin_ns);
     if (!args.imu_mounting.empty()) args.config.imu->mounting = read_imu_mounting(args.imu_mounting);
   }
   if (!args.range.empty()) args.config.range_readings = read_ranges(args.range, args.skip_bad, &args.skipped);

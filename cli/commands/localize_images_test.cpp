@@ -44,6 +44,10 @@ class LocalizeImageFolders : public testing::CommandTest {
   }
 };
 
+const std::string euroc_imu_header =
+    "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m "
+    "s^-2],a_RS_S_z [m s^-2]\n";
+
 TEST_F(LocalizeImageFolders, ReadsTheLayoutOfEuRoC) {
   const fs::path data = path("flight/mav0/cam0/data");
   fs::create_directories(data);
@@ -61,6 +65,20 @@ TEST_F(LocalizeImageFolders, ReadsTheLayoutOfEuRoC) {
   EXPECT_EQ(b["frames"], num_frames);
   EXPECT_EQ(b["lost"], 0);
   EXPECT_NEAR(b["ate_m"].get<double>(), a["ate_m"].get<double>(), 2e-4);  // times are rounded to milliseconds
+  // As that data set has them: times since 1970, also of its IMU.
+  const auto since_1970 = [](long ns) { return 1403636579763555584L + ns; };
+  std::string later = "#timestamp [ns],filename\n", imu = euroc_imu_header;
+  for (int i = 0; i < num_frames; ++i)
+    later += fmt::format("{},{}.png\n", since_1970(1'000'000 * ((1000L * i + 15) / 30)),
+                         1'000'000 * ((1000L * i + 15) / 30));
+  for (long k = -20; k < 100; ++k) imu += fmt::format("{},0,0,0,0.1,-9.79,0.5\n", since_1970(5'000'000 * k));
+  write_file(path("flight/mav0/cam0/data.csv"), later);
+  write_file(path("flight/mav0/imu0.csv"), imu);
+  const Outcome with_imu = localize("flight", {"--imu", path("flight/mav0/imu0.csv")});
+  ASSERT_EQ(with_imu.code, 0) << with_imu.err;
+  EXPECT_NE(with_imu.out.find("IMU"), std::string::npos);
+  EXPECT_EQ(with_imu.out.find("none of the IMU's readings is of the time of the path"), std::string::npos);
+  write_file(path("flight/mav0/cam0/data.csv"), table);
   fs::remove(data / "0.png");
   const Outcome without = localize("flight", {});  // an image that is missing is a gap
   ASSERT_EQ(without.code, 0) << without.err;

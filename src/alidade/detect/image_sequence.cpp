@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -42,11 +43,16 @@ path images_of(const path& given) {
   return asl.images.empty() ? given : asl.images;
 }
 
-/// `timestamp [ns],filename` a row; lines that begin with # are comments. Seconds after the first.
-std::vector<double> asl_times_s(const path& table, const path& images) {
-  const std::string text = read_file(table);
-  std::vector<long long> times_ns;
+/// Of EuRoC's table: the times and names of its images.
+struct AslTable {
+  std::vector<std::int64_t> times_ns;
   std::vector<std::string> names;
+};
+
+/// `timestamp [ns],filename` a row; lines that begin with # are comments.
+AslTable read_asl_table(const path& file) {
+  const std::string text = read_file(file);
+  AslTable table;
   std::size_t line = 0;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
@@ -56,27 +62,34 @@ std::vector<double> asl_times_s(const path& table, const path& images) {
     while (!row.empty() && (row.back() == '\r' || row.back() == ' ')) row.pop_back();
     if (row.empty() || row.front() == '#') continue;
     const auto fail = [&](const std::string& what) {
-      throw InputError(fmt::format("{}:{}: {}", table.string(), line, what));
+      throw InputError(fmt::format("{}:{}: {}", file.string(), line, what));
     };
     const std::size_t comma = row.find(',');
-    const std::string time = row.substr(0, comma);
-    if (comma == std::string::npos || time.empty() || time.size() > 18 ||
-        time.find_first_not_of("0123456789") != std::string::npos)
+    std::int64_t time_ns = -1;
+    const char* const end_of_time = row.data() + std::min(comma, row.size());
+    const auto read = std::from_chars(row.data(), end_of_time, time_ns);
+    if (comma == std::string::npos || read.ec != std::errc{} || read.ptr != end_of_time || time_ns < 0)
       fail("is not 'timestamp [ns],filename'");
-    times_ns.push_back(std::stoll(time));
-    names.push_back(row.substr(row.find_first_not_of(' ', comma + 1)));
-    if (times_ns.size() > 1 && times_ns.back() <= times_ns[times_ns.size() - 2])
-      fail(fmt::format("'{}' is not after the time before it", time));
+    if (!table.times_ns.empty() && time_ns <= table.times_ns.back())
+      fail(fmt::format("'{}' is not after the time before it", time_ns));
+    table.times_ns.push_back(time_ns);
+    table.names.push_back(row.substr(std::min(row.find_first_not_of(' ', comma + 1), row.size())));
   }
-  const std::vector<path> files = list_photos({images});
+  return table;
+}
+
+/// Seconds after the first.
+std::vector<double> asl_times_s(const path& file, const path& images) {
+  const AslTable table = read_asl_table(file);
   std::vector<double> times_s;
-  for (const path& file : files) {
-    const auto at = std::ranges::find(names, file.filename().string());
-    if (at == names.end()) throw InputError(fmt::format("{}: has no time for {}", table.string(), file.string()));
-    times_s.push_back(1e-9 * static_cast<double>(times_ns[static_cast<std::size_t>(at - names.begin())] - times_ns[0]));
+  for (const path& image : list_photos({images})) {
+    const auto at = std::ranges::find(table.names, image.filename().string());
+    if (at == table.names.end()) throw InputError(fmt::format("{}: has no time for {}", file.string(), image.string()));
+    const std::int64_t time_ns = table.times_ns[static_cast<std::size_t>(at - table.names.begin())];
+    times_s.push_back(1e-9 * static_cast<double>(time_ns - table.times_ns.front()));
     if (times_s.size() > 1 && !(times_s.back() > times_s[times_s.size() - 2]))
       throw InputError(
-          fmt::format("{}: the time of {} is not after the image before it", table.string(), file.filename().string()));
+          fmt::format("{}: the time of {} is not after the image before it", file.string(), image.filename().string()));
   }
   return times_s;
 }
@@ -150,6 +163,13 @@ bool is_image_sequence(const path& given) {
   std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   constexpr std::array endings{".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg"};
   return std::ranges::any_of(endings, [&](const char* video) { return ending == video; });
+}
+
+std::int64_t origin_ns_of(const path& given) {
+  const AslFolder asl = asl_folder(given);
+  if (asl.table.empty()) return 0;
+  const AslTable table = read_asl_table(asl.table);
+  return table.times_ns.empty() ? 0 : table.times_ns.front();
 }
 
 ImageStream images_in(const path& given, const Camera& camera, double rate_hz) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 
 #include "alidade/camera/camera.h"
@@ -19,6 +20,10 @@ ALIDADE_PUBLIC_BEGIN
 /// thing, no images, no times, times that run backwards, an image that data.csv does not name; and when it comes to it,
 /// what is no image, or not of that size. Copies share how far they are.
 [[nodiscard]] ImageStream images_in(const std::filesystem::path& path, const Camera& camera, double rate_hz = 0.0);
+
+/// The time [ns] that is zero in such a folder of EuRoC's layout, the first in its data.csv: of other files of the same
+/// recording, as imu0/data.csv, this has to be subtracted. 0 for any other sequence. Throws InputError.
+[[nodiscard]] std::int64_t origin_ns_of(const std::filesystem::path& path);
 
 /// Reads target.yaml for images: `rectangle: {width_m, height_m, sigma_m}`, `board: {corners, square_m}`, or `points`
 /// of which each has a `patch`, a small grey image of it, relative to the file.

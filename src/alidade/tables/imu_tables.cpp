@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 #include "alidade/files/table_rows.h"
 #include "alidade/files/yaml_fields.h"
@@ -14,8 +15,19 @@
 namespace alidade {
 namespace {
 
-const std::array<std::string, 7> imu_columns{"t_s",          "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s",
-                                             "force_x_m_s2", "force_y_m_s2",  "force_z_m_s2"};
+using ImuColumns = std::array<std::string, 7>;  // time, rates, forces
+
+const ImuColumns imu_columns{"t_s",          "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s",
+                             "force_x_m_s2", "force_y_m_s2",  "force_z_m_s2"};
+/// Those of EuRoC's imu0/data.csv, times as whole nanoseconds.
+const ImuColumns euroc_columns{"#timestamp [ns]",   "w_RS_S_x [rad s^-1]", "w_RS_S_y [rad s^-1]", "w_RS_S_z [rad s^-1]",
+                               "a_RS_S_x [m s^-2]", "a_RS_S_y [m s^-2]",   "a_RS_S_z [m s^-2]"};
+
+/// Nanoseconds since 1970 need more digits than a double has: the difference is taken before.
+double seconds_after(const Csv& csv, std::size_t row, std::int64_t origin_ns) {
+  return 1e-9 *
+         static_cast<double>(csv.integer(row, euroc_columns[0], 0, std::numeric_limits<long>::max()) - origin_ns);
+}
 
 double positive_or(const detail::Fields& fields, const std::string& key, double otherwise) {
   if (!fields.has(key)) return otherwise;
@@ -54,20 +66,23 @@ Eigen::Quaterniond imu_rotation(const detail::Fields& fields) {
 
 }  // namespace
 
-std::vector<ImuReading> read_imu(const std::filesystem::path& file, bool skip_bad, std::vector<SkippedInput>* skipped) {
+std::vector<ImuReading> read_imu(const std::filesystem::path& file, bool skip_bad, std::vector<SkippedInput>* skipped,
+                                 std::int64_t origin_ns) {
   const Csv csv = Csv::read(file);
-  csv.require(imu_columns);
+  const bool is_euroc = csv.has(euroc_columns[0]);
+  const ImuColumns& columns = is_euroc ? euroc_columns : imu_columns;
+  csv.require(columns);
   std::vector<ImuReading> readings;
   std::vector<SkippedInput> named;
   for_each_row(csv, skip_bad, named, [&](std::size_t row) {
     ImuReading reading;
-    reading.t_s = csv.number(row, "t_s");
+    reading.t_s = is_euroc ? seconds_after(csv, row, origin_ns) : csv.number(row, columns[0]);
     if (!readings.empty() && !(reading.t_s > readings.back().t_s))
-      throw InputError(csv.where(row, "t_s") +
-                       fmt::format(": '{}' is not after the row before it", csv.text(row, "t_s")));
+      throw InputError(csv.where(row, columns[0]) +
+                       fmt::format(": '{}' is not after the row before it", csv.text(row, columns[0])));
     for (std::size_t i = 0; i < 3; ++i) {
-      reading.rate_rad_s[static_cast<Eigen::Index>(i)] = csv.number(row, imu_columns[1 + i]);
-      reading.force_m_s2[static_cast<Eigen::Index>(i)] = csv.number(row, imu_columns[4 + i]);
+      reading.rate_rad_s[static_cast<Eigen::Index>(i)] = csv.number(row, columns[1 + i]);
+      reading.force_m_s2[static_cast<Eigen::Index>(i)] = csv.number(row, columns[4 + i]);
     }
     readings.push_back(reading);
   });
@@ -83,7 +98,7 @@ std::string imu_csv(std::span<const ImuReading> readings) {
   text += '\n';
   for (const ImuReading& reading : readings) {
     const Eigen::Vector3d &w = reading.rate_rad_s, &f = reading.force_m_s2;
-    text += fmt::format("{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", reading.t_s, w.x(), w.y(), w.z(), f.x(),
+    text += fmt::format("{:.9f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", reading.t_s, w.x(), w.y(), w.z(), f.x(),
                         f.y(), f.z());
   }
   return text;

@@ -61,6 +61,33 @@ TEST_F(ImuTables, WrongReadingsAreRefusedByLineAndColumn) {
   EXPECT_EQ(skipped.size(), 1u);
 }
 
+/// The file as that data set has it: its first rows of MH_01, times in ns since 1970.
+TEST_F(ImuTables, ReadsTheFileOfEuRoC) {
+  const std::string euroc =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m "
+      "s^-2],a_RS_S_z [m s^-2]\r\n"
+      "1403636579758555392,-0.099134701513277898,0.14730578886832138,0.02722713633111154,8.1476917083333333,"
+      "-0.37592158333333331,-2.4026292499999999\r\n"
+      "1403636579763555584,-0.099134701513277898,0.14032447186034408,0.029321531433504733,8.033280791666666,"
+      "-0.40861041666666664,-2.4026292499999999\r\n"
+      "1403636579768555520,-0.098436569812480182,0.12775810124598494,0.037699111843077518,7.8861810416666662,"
+      "-0.42495483333333334,-2.4353180833333332\r\n";
+  const std::vector<ImuReading> read = read_imu(file(euroc), false, nullptr, 1403636579763555584);
+  ASSERT_EQ(read.size(), 3u);
+  EXPECT_DOUBLE_EQ(read[0].t_s, -0.005000192);
+  EXPECT_EQ(read[1].t_s, 0.0);
+  EXPECT_DOUBLE_EQ(read[2].t_s, 0.004999936);
+  EXPECT_EQ(read[1].rate_rad_s, Eigen::Vector3d(-0.099134701513277898, 0.14032447186034408, 0.029321531433504733));
+  EXPECT_EQ(read[2].force_m_s2, Eigen::Vector3d(7.8861810416666662, -0.42495483333333334, -2.4353180833333332));
+  const auto said = [&](const std::string& text) {
+    return refusal([](const auto& file) { return read_imu(file); }, text);
+  };
+  EXPECT_THAT(said("#timestamp [ns],w_RS_S_x [rad s^-1]\n0,1\n"), HasSubstr("w_RS_S_y [rad s^-1]"));
+  std::string seconds = euroc;
+  seconds.replace(seconds.find("1403636579768555520"), 19, "1403636579.76855552");
+  EXPECT_THAT(said(seconds), HasSubstr(":4: column '#timestamp [ns]'"));
+}
+
 TEST_F(ImuTables, MountingsAreOursOrKalibrs) {
   ImuMounting mounting;
   mounting.cam_from_imu = {Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.06, -0.02, 0.03}};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -48,9 +49,11 @@ struct ObservationsOptions {
 [[nodiscard]] std::vector<OdometryReading> read_odometry(const std::filesystem::path& file, bool skip_bad = false,
                                                          std::vector<SkippedInput>* skipped = nullptr);
 
-/// Reads `t_s,omega_x_rad_s,…,force_x_m_s2,…` of an IMU, in order of time. Throws InputError.
+/// Reads `t_s,omega_x_rad_s,…,force_x_m_s2,…` of an IMU, or EuRoC's imu0/data.csv (`#timestamp [ns],w_RS_S_x [rad
+/// s^-1],…,a_RS_S_x [m s^-2],…`), in order of time. Of EuRoC's t_s is after `origin_ns`. Throws InputError.
 [[nodiscard]] std::vector<ImuReading> read_imu(const std::filesystem::path& file, bool skip_bad = false,
-                                               std::vector<SkippedInput>* skipped = nullptr);
+                                               std::vector<SkippedInput>* skipped = nullptr,
+                                               std::int64_t origin_ns = 0);
 [[nodiscard]] std::string imu_csv(std::span<const ImuReading> readings);
 /// Reads cam_from_imu: translation_m, quaternion_wxyz, or Kalibr's T_cam_imu; sigma_rotation_rad, sigma_translation_m.
 [[nodiscard]] ImuMounting read_imu_mounting(const std::filesystem::path& file);

@@ -89,7 +89,7 @@ void add_imu(const SimulateUnderwaterArgs& args, const UnderwaterSequence& seque
       "t_s,rate_bias_x,rate_bias_y,rate_bias_z,force_bias_x,force_bias_y,force_bias_z,gravity_x,"
       "gravity_y,gravity_z,late_s\n";
   for (const std::size_t i : {std::size_t{0}, imu.readings.size() - 1}) {
-    truth += fmt::format("{:.9g}", imu.readings[i].t_s);
+    truth += fmt::format("{:.9f}", imu.readings[i].t_s);
     for (const Eigen::Vector3d& each : {imu.rate_bias[i], imu.force_bias[i], scene.gravity_in_world})
       truth += fmt::format(",{:.9g},{:.9g},{:.9g}", each.x(), each.y(), each.z());
     truth += fmt::format(",{:.9g}\n", scene.late_s);

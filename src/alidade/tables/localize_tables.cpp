@@ -111,9 +111,9 @@ std::vector<OdometryReading> read_odometry(const std::filesystem::path& file, bo
 std::string observations_csv(std::span<const ObservationFrame> frames) {
   std::string text = "frame,t_s,point_id,u_px,v_px\n";
   for (const ObservationFrame& frame : frames) {
-    if (frame.observations.empty()) text += fmt::format("{},{:.9g},,,\n", frame.frame, frame.t_s);
+    if (frame.observations.empty()) text += fmt::format("{},{:.9f},,,\n", frame.frame, frame.t_s);
     for (const FeatureObservation& observation : frame.observations)
-      text += fmt::format("{},{:.9g},{},{:.4f},{:.4f}\n", frame.frame, frame.t_s, observation.id, observation.px.x(),
+      text += fmt::format("{},{:.9f},{},{:.4f},{:.4f}\n", frame.frame, frame.t_s, observation.id, observation.px.x(),
                           observation.px.y());
   }
   return text;
@@ -188,7 +188,7 @@ std::string poses_csv(std::span<const PathStep> path) {
     for (std::size_t j = i; j < 6; ++j) text += fmt::format(",cov_{}_{}", names[i], names[j]);
   text += ",num_seen,num_tracked,num_gated,nis_per_dof,event\n";
   for (const PathStep& step : path) {
-    text += fmt::format("{},{:.9g}", step.frame, step.t_s);
+    text += fmt::format("{},{:.9f}", step.frame, step.t_s);
     text += step.has_pose() ? pose_cells(step.world_from_cam, false) : ",,,,,,,";
     for (int i = 0; i < 6; ++i)
       for (int j = i; j < 6; ++j) text += step.has_pose() ? fmt::format(",{:.6g}", step.cov(i, j)) : ",";

@@ -8,6 +8,7 @@
 
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
+#include "alidade/servo/identify/log_times.h"
 
 namespace alidade {
 namespace {
@@ -26,11 +27,25 @@ void require_sense(const std::vector<ServoSample>& log) {
   }
 }
 
-/// Assumptions. By definition: angles are the encoder's own radians, times the log's own seconds.
-std::vector<Assumption> assumed_of(const ServoIdentification& identified) {
+/// The rate of the log's clock, and what of the plant it moves most.
+Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
+  Assumption clock{.name = "clock_rate", .value = 1.0, .sigma = sigma_clock, .moved = "tau_s"};
+  const ServoParams moved = sigma_clock * by_clock_rate(fit);
+  for (const int param : {ServoParam::tau, ServoParam::latency, ServoParam::gain}) {
+    const double by = std::abs(moved[param]) / std::sqrt(fit.cov(param, param));
+    if (!(by > clock.moves)) continue;
+    clock.moves = by;
+    clock.moved = param == ServoParam::gain ? "gain_rad" : servo_param_names[static_cast<std::size_t>(param)];
+    clock.moved_by = std::abs(moved[param]);
+  }
+  return clock;
+}
+
+/// Assumptions. By definition: angles are the encoder's own radians.
+std::vector<Assumption> assumed_of(const ServoIdentification& identified, double sigma_clock) {
   const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
-                                     {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
+                                     assumed_clock(identified.fit, sigma_clock)};
   for (const CountedFlaw& counted : identified.counted) {
     const bool is_listed =
         std::ranges::any_of(identified.hidden, [&](const HiddenFlaw& hidden) { return hidden.flaw == counted.flaw; });
@@ -67,12 +82,19 @@ FieldList fields_of(IdentifyConfig& config) {
   return {{.name = "kind",
            .value = words_code(config.kind, servo_kind_words()),
            .help = "What follows the command with a lag: the angle, or its rate; auto: the one whose residuals are "
-                   "clearly the smaller"}};
+                   "clearly the smaller"},
+          {.name = "sigma_clock",
+           .value = &config.sigma_clock,
+           .help = "σ of the rate of the log's clock (0.001: 0.1 %), counted in σ; 0: exact",
+           .limits = {.min = 0.0, .max = 0.1}}};
 }
 
 Identification identify(std::vector<ServoSample> log, const IdentifyConfig& config) {
   if (config.kind < ServoKindRule::automatic || config.kind > ServoKindRule::rate)
     throw ConfigError("kind is none of auto, angle, rate");
+  IdentifyConfig checked = config;
+  if (const std::vector<std::string> found = faults_of(fields_of(checked)); !found.empty())
+    throw ConfigError(found.front());
   require_sense(log);
   constexpr std::size_t min_rows = 20;
   Identification result;
@@ -80,11 +102,12 @@ Identification identify(std::vector<ServoSample> log, const IdentifyConfig& conf
   result.config = config;
   if (result.log.size() >= min_rows)
     static_cast<ServoIdentification&>(result) = identify_servo(result.log, config.kind);
+  if (result.fit.is_observable) count_clock_rate(config.sigma_clock, result.fit);
   result.verdict = identify_verdict(result.log, result);
   result.counts.given = result.counts.used = result.log.size();
   if (result.residual_rad.empty()) return result;
   result.encoder_step_rad = encoder_step_rad(result.log);
-  result.assumed = assumed_of(result);
+  result.assumed = assumed_of(result, config.sigma_clock);
   return result;
 }
 

@@ -43,6 +43,7 @@ void fill_flaws(const Identification& identified, ResultDocument& document) {
     document.estimate["evidence"][servo_flaw_names[flaw]] = fit.flaw_evidence[flaw];
   }
   document.estimate["encoder_step_rad"] = identified.encoder_step_rad;
+  document.estimate["sigma_time_s"] = identified.sigma_time_s;
 }
 
 void fill_identification(const Identification& identified, ResultDocument& document) {

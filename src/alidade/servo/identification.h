@@ -42,17 +42,21 @@ struct ServoFlaws {
   double dead_band = 0.0;     ///< Commands smaller than it do nothing, larger ones count from it.
   double backlash_rad = 0.0;  ///< Play between what drives the axis and the angle that is read.
   double second_tau_s = 0.0;  ///< A first-order lag of the command, before the plant.
+  double clock_rate = 0.0;    ///< Angles are read by a clock of which a second is 1 + it of the commands'.
 };
-inline constexpr std::size_t num_servo_flaws = 5;
+inline constexpr std::size_t num_servo_flaws = 6;
 inline constexpr std::array<double ServoFlaws::*, num_servo_flaws> servo_flaws{
-    &ServoFlaws::max_rate_rad_s, &ServoFlaws::max_acceleration_rad_s2, &ServoFlaws::dead_band,
-    &ServoFlaws::backlash_rad, &ServoFlaws::second_tau_s};
-inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_names{"max_rate_rad_s", "max_acceleration_rad_s2",
-                                                                           "dead_band", "backlash_rad", "second_tau_s"};
+    &ServoFlaws::max_rate_rad_s, &ServoFlaws::max_acceleration_rad_s2,
+    &ServoFlaws::dead_band,      &ServoFlaws::backlash_rad,
+    &ServoFlaws::second_tau_s,   &ServoFlaws::clock_rate};
+inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_names{
+    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band", "backlash_rad", "second_tau_s", "clock_rate"};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
-    "a limit of its rate", "a limit of its acceleration", "a dead band", "backlash", "a second lag"};
+    "a limit of its rate", "a limit of its acceleration",
+    "a dead band",         "backlash",
+    "a second lag",        "a drift between the clocks of commands and angles"};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/s", "rad/s^2", "units of command",
-                                                                           "rad", "s"};
+                                                                           "rad",   "s",       "s/s"};
 
 struct ServoFit {
   ServoKind kind = ServoKind::angle;
@@ -99,6 +103,8 @@ struct ServoIdentification {
   std::vector<ServoRival> rivals;    ///< Of the flaws that were freed.
   std::vector<HiddenFlaw> hidden;
   std::vector<CountedFlaw> counted;  ///< In the fit's covariance.
+  double sigma_time_s = 0.0;         ///< By which the rows' times err, where the residuals show it; in the covariance.
+  double sigma_time_score = 0.0;     ///< Of it, in σ.
   double lag_one_correlation = 0.0;  ///< Of the residuals, one row to the next: near 0 where the model is enough.
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };
@@ -109,6 +115,7 @@ enum class ServoKindRule { automatic, angle, rate };
 /// Options of identify().
 struct IdentifyConfig {
   ServoKindRule kind = ServoKindRule::automatic;
+  double sigma_clock = 0.001;  ///< Of the rate of the log's clock, counted in σ.
 };
 
 /// The fields of `config` that a user sets.

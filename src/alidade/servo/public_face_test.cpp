@@ -19,7 +19,7 @@ using testing::log_of;
 TEST(IdentifyFace, IsTheWholeJob) {
   for (const bool is_rate_plant : {false, true}) {
     const auto log = log_of(late_scene(is_rate_plant));
-    const Identification result = identify(log);
+    const Identification result = identify(log, {.sigma_clock = 0.0});
     const ServoIdentification part = identify_servo(log);
     EXPECT_EQ(result.fit.params, part.fit.params);
     EXPECT_EQ(result.fit.cov, part.fit.cov);

@@ -113,7 +113,8 @@ void note_rivals(std::span<const ServoSample> log, const std::vector<Candidate>&
 
 }  // namespace
 
-ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std::vector<ServoRival>& rivals) {
+ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std::span<const std::size_t> flaws,
+                    std::vector<ServoRival>& rivals) {
   constexpr std::size_t max_freed = 3;
   constexpr double max_colour = 0.3;
   ServoFit fit = plain;
@@ -121,8 +122,9 @@ ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std
     const FlawGround ground = flaw_ground(log, fit);
     const double sum2 = ground.misfit.squaredNorm();
     std::vector<Candidate> candidates;
-    for (std::size_t flaw = 0; flaw < num_servo_flaws; ++flaw)
+    for (const std::size_t flaw : flaws)
       if (std::ranges::count(fit.freed, flaw) == 0) candidates.push_back(freed(log, fit, ground, flaw));
+    if (candidates.empty()) break;
     std::ranges::sort(candidates, {}, &Candidate::sum2);
     const Candidate& best = candidates.front();
     const Evidence single = evidence_for(log, sum2, 1.0, best);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "alidade/geometry/decompositions.h"
@@ -12,6 +13,7 @@
 #include "alidade/servo/identify/identify_clusters.h"
 #include "alidade/servo/identify/identify_flaws.h"
 #include "alidade/servo/identify/levenberg.h"
+#include "alidade/servo/identify/log_times.h"
 #include "alidade/servo/identify/ordinary_flaws.h"
 
 namespace alidade {
@@ -187,18 +189,23 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
     fit.flaw_sigma[fit.freed[i]] = std::sqrt(cov(at, at));
   }
   count_ordinary_flaws(log, J, *inverse, result);
+  count_time_stamps(log, J, *inverse, result);
 }
 
-/// Whether the residuals of a linear fit indicate more.
-bool asks_for_more(std::span<const ServoSample> log, const ServoFit& fit) {
+/// Which flaws to try: all where the residuals of a linear fit indicate one, the clock alone where only that is.
+std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr double max_colour = 0.3, min_sigmas = 3.5;
   const FlawGround ground = flaw_ground(log, fit);
   const std::vector<double> residuals(ground.misfit.data(), ground.misfit.data() + ground.misfit.size());
-  if (std::abs(lag_one(residuals)) > max_colour) return true;
+  std::vector<std::size_t> all(num_servo_flaws);
+  std::iota(all.begin(), all.end(), 0);
+  if (std::abs(lag_one(residuals)) > max_colour) return all;
   const double sum2 = ground.misfit.squaredNorm(), least2 = min_sigmas * min_sigmas * fit.rms_rad * fit.rms_rad;
-  for (std::size_t flaw = 0; flaw < num_servo_flaws && sum2 > 0.0; ++flaw)
-    if (flaw_scores(log, fit, ground, flaw).front().gain2 > least2) return true;
-  return false;
+  std::vector<std::size_t> indicated;
+  for (const std::size_t flaw : all)
+    if (sum2 > 0.0 && flaw_scores(log, fit, ground, flaw).front().gain2 > least2) indicated.push_back(flaw);
+  const bool is_clock = indicated == std::vector<std::size_t>{ServoFlaw::clock_rate};
+  return indicated.empty() || is_clock ? indicated : all;
 }
 
 }  // namespace
@@ -263,8 +270,9 @@ ServoIdentification identify_servo(std::span<const ServoSample> log, ServoKindRu
                                refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
   std::array<std::vector<ServoRival>, 2> rivals;
   // Where one kind explains the log as it is, the other is not made to.
-  const bool is_enough = !asks_for_more(log, fits[believed_of(fits, rule)]);
-  for (std::size_t kind = 0; kind < 2 && !is_enough; ++kind) fits[kind] = with_flaws(log, fits[kind], rivals[kind]);
+  const std::vector<std::size_t> tried = indicated_flaws(log, fits[believed_of(fits, rule)]);
+  for (std::size_t kind = 0; kind < 2 && !tried.empty(); ++kind)
+    fits[kind] = with_flaws(log, fits[kind], tried, rivals[kind]);
   const std::size_t believed = believed_of(fits, rule);
   result.fit = fits[believed];
   result.other = fits[1 - believed];

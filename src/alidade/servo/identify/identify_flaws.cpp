@@ -15,6 +15,7 @@ namespace {
 using Eigen::Index;
 
 constexpr double no_limit = 1e9;
+constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one; beyond it nobody calls it a clock.
 
 /// A servo half-way through its log: an axis of gain and flaws as fitted, which counts its commands from zero.
 class FlawedServo {
@@ -87,7 +88,12 @@ class FlawedServo {
   double lagged_, read_ = 0.0;
 };
 
-/// What a step of one parameter or freed flaw makes of a fit; flaws, gains' and lags' sizes go by factors.
+/// What a step of one is in a flaw's size: all but the clock's have one sign, and go by factors.
+double unit_of(const ServoFlaws& flaws, std::size_t flaw) {
+  return flaw == ServoFlaw::clock_rate ? clock_unit : flaws.*servo_flaws[flaw];
+}
+
+/// What a step of one parameter or freed flaw makes of a fit.
 ServoFit moved(const ServoFit& fit, Index param, double by) {
   ServoFit next = fit;
   if (param < num_servo_params) {
@@ -96,7 +102,9 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
   } else {
     const std::size_t flaw = fit.freed[static_cast<std::size_t>(param - num_servo_params)];
     double& size = next.flaws.*servo_flaws[flaw];
-    size *= std::exp(std::clamp(by, -1.0, 1.0));
+    by = std::clamp(by, -1.0, 1.0);
+    size = flaw == ServoFlaw::clock_rate ? std::clamp(size + clock_unit * by, -max_clock_rate, max_clock_rate)
+                                         : size * std::exp(by);
     // Of two lags one is the shorter: the second.
     if (flaw == ServoFlaw::second_lag)
       size = std::clamp(size, 0.02 * next.params[ServoParam::tau], next.params[ServoParam::tau]);
@@ -122,7 +130,7 @@ double step_of(std::span<const ServoSample> log, const ServoFit& fit, Index para
   }
 }
 
-/// ∂ / ∂ (parameters, ln of freed flaws).
+/// ∂ / ∂ (parameters, freed flaws in units of their own).
 Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const ServoFit& fit) {
   const auto num = static_cast<Index>(num_servo_params + fit.freed.size());
   Eigen::MatrixXd J(static_cast<Index>(log.size()), num);
@@ -167,6 +175,8 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
       return times(max_command(log), {0.005, 0.01, 0.02, 0.05, 0.1, 0.2});
     case ServoFlaw::backlash:
       return times(response.maxCoeff() - response.minCoeff(), {0.002, 0.005, 0.01, 0.02, 0.05, 0.1});
+    case ServoFlaw::clock_rate:  // by the end a part of the time constant
+      return times(fit.params[ServoParam::tau] / (log.back().t_s - log.front().t_s), {-0.2, -0.02, 0.02, 0.2});
     default:
       return times(fit.params[ServoParam::tau], {0.1, 0.3, 0.6, 1.0});
   }
@@ -180,14 +190,15 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
   double now_s = log.front().t_s, command = log.front().command;
   std::size_t next = 1;
   for (std::size_t i = 0; i < log.size(); ++i) {
-    for (; next < log.size() && log[next].given_s() + fit.params[ServoParam::latency] <= log[i].t_s; ++next) {
+    const double read_s = log[i].t_s + flaws.clock_rate * (log[i].t_s - log.front().t_s);
+    for (; next < log.size() && log[next].given_s() + fit.params[ServoParam::latency] <= read_s; ++next) {
       if (log[next].command == command) continue;
       servo.advance(log[next].given_s() + fit.params[ServoParam::latency] - now_s, command);
       now_s = log[next].given_s() + fit.params[ServoParam::latency];
       command = log[next].command;
     }
-    servo.advance(log[i].t_s - now_s, command);
-    now_s = log[i].t_s;
+    servo.advance(read_s - now_s, command);
+    now_s = read_s;
     angles[static_cast<Index>(i)] = fit.params[ServoParam::zero] + servo.read_rad();
   }
   return angles;
@@ -225,7 +236,7 @@ double effective_rows(const Eigen::VectorXd& misfit) {
 Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit) {
   Eigen::MatrixXd J = jacobian_by_factors(log, fit);
   for (std::size_t i = 0; i < fit.freed.size(); ++i)
-    J.col(num_servo_params + static_cast<Index>(i)) /= fit.flaws.*servo_flaws[fit.freed[i]];
+    J.col(num_servo_params + static_cast<Index>(i)) /= unit_of(fit.flaws, fit.freed[i]);
   return J;
 }
 

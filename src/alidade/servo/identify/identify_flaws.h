@@ -9,7 +9,7 @@ namespace alidade {
 
 /// Indices in servo_flaws.
 struct ServoFlaw {
-  enum Place : std::size_t { rate_limit, acceleration_limit, dead_band, backlash, second_lag };
+  enum Place : std::size_t { rate_limit, acceleration_limit, dead_band, backlash, second_lag, clock_rate };
 };
 
 /// Angles that a servo of this fit, with its flaws, reads at the times of the log. In closed form, but for a second
@@ -44,13 +44,13 @@ struct FlawScore {
 [[nodiscard]] std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const ServoFit& fit,
                                                  const FlawGround& ground, std::size_t flaw);
 
-/// The fit with every nonlinearity that the log supports, one after the other: 2 ln of the likelihood ratio, counted in
-/// rows that do not share errors, above ln n + 12 (Schwarz's criterion, and a margin for the choice among flaws and
-/// sizes). Of an angle plant the limits of rate and acceleration are tried together as well, where one alone leaves
-/// structure. `rivals`: flaws that explain the same nearly as well. G. Schwarz, "Estimating the dimension of a model",
-/// 1978.
+/// The fit with every one of these flaws that the log supports, one after the other: 2 ln of the likelihood ratio,
+/// counted in rows that do not share errors, above ln n + 12 (Schwarz's criterion, and a margin for the choice among
+/// flaws and sizes). Of an angle plant the limits of rate and acceleration are tried together as well, where one alone
+/// leaves structure. `rivals`: flaws that explain the same nearly as well. G. Schwarz, "Estimating the dimension of a
+/// model", 1978.
 [[nodiscard]] ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain,
-                                  std::vector<ServoRival>& rivals);
+                                  std::span<const std::size_t> flaws, std::vector<ServoRival>& rivals);
 
 /// Dead band, backlash and a limit of the rate, each of a typical size, that the log would not show: with it the rest
 /// fits equally well.

@@ -5,6 +5,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
+#include "alidade/servo/identify/log_times.h"
 
 namespace alidade {
 namespace {
@@ -54,7 +55,9 @@ std::string flaw_text(const ServoFit& fit, std::size_t flaw) {
 void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const std::vector<ServoCause> causes = servo_causes(log, identified);
-  Check check{.name = "causes", .text = "neither limits, dead band, backlash nor a second lag show", .unit = "σ"};
+  Check check{.name = "causes",
+              .text = "neither limits, dead band, backlash, a second lag nor a drift of clocks show",
+              .unit = "σ"};
   check.limit = 4.0;
   if (!fit.freed.empty()) {
     check.text = "estimated as well: ";
@@ -124,6 +127,11 @@ void add_readings(std::span<const ServoSample> log, const ServoIdentification& i
         {"units", State::care,
          "the axis turns by " + text_of(fastest_rad_s, 2) + " rad/s: are these degrees? name the column angle_deg",
          fastest_rad_s, max_rate_rad_s, "rad/s", ""});
+  if (identified.sigma_time_s > 0.0)
+    verdict.checks.push_back({"time stamps", State::good,
+                              "errors grow with the rate, as of times that err by " +
+                                  text_of(1e3 * identified.sigma_time_s, 2) + " ms (σ): counted in σ",
+                              identified.sigma_time_score, sigmas_of_time_stamps, "σ", ""});
   const double spacing_s = identified.duration_s / (static_cast<double>(log.size()) - 1.0);
   if (spacing_s > max_spacing_s)
     verdict.checks.push_back({"times", State::care,

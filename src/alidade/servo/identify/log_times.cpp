@@ -1,0 +1,83 @@
+#include "alidade/servo/identify/log_times.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/servo/identify/identify_flaws.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Index;
+
+/// The variance of the rows' times, from a regression of r² on the squared rate, and its score.
+struct TimeVariance {
+  double value = 0.0, score = 0.0;
+};
+TimeVariance time_variance(const ServoIdentification& result, const Eigen::VectorXd& rate) {
+  const auto n = static_cast<Index>(result.residual_rad.size());
+  const Eigen::ArrayXd residual = Eigen::Map<const Eigen::ArrayXd>(result.residual_rad.data(), n);
+  const Eigen::ArrayXd square = residual.square() - residual.square().mean();
+  const Eigen::ArrayXd rate2 = rate.array().square() - rate.array().square().mean();
+  const double spread = rate2.square().sum();
+  if (!(spread > 0.0) || !(square.square().sum() > 0.0)) return {};
+  // Squares of neighbouring residuals are correlated by the square of what these are.
+  const double colour = std::min(
+      0.95, std::pow((residual.head(n - 1) * residual.tail(n - 1)).sum(), 2) / std::pow(residual.square().sum(), 2));
+  const double slope = (square * rate2).sum() / spread;
+  const double sigma = std::sqrt(square.square().mean() / spread * (1.0 + colour) / (1.0 - colour));
+  return {slope, slope / sigma};
+}
+
+/// ∂ rate / ∂ t.
+Eigen::VectorXd slope_of(std::span<const ServoSample> log, const Eigen::VectorXd& rate) {
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(rate.size());
+  for (Index i = 1; i + 1 < rate.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    slope[i] = (rate[i + 1] - rate[i - 1]) / (log[at + 1].t_s - log[at - 1].t_s);
+  }
+  return slope;
+}
+
+}  // namespace
+
+ServoParams by_clock_rate(const ServoFit& fit) {
+  ServoParams by = ServoParams::Zero();
+  by[ServoParam::tau] = fit.params[ServoParam::tau];
+  by[ServoParam::latency] = fit.params[ServoParam::latency];
+  if (fit.kind == ServoKind::rate) {
+    by[ServoParam::gain] = -fit.params[ServoParam::gain];
+    by[ServoParam::start] = -fit.params[ServoParam::start];
+  }
+  return by;
+}
+
+void count_clock_rate(double sigma_clock, ServoFit& fit) {
+  const ServoParams moved = sigma_clock * by_clock_rate(fit);
+  fit.cov += moved * moved.transpose();
+  for (const std::size_t flaw : fit.freed) {
+    const bool is_of_time = flaw == ServoFlaw::rate_limit || flaw == ServoFlaw::second_lag;
+    const double power = flaw == ServoFlaw::acceleration_limit ? 2.0 : is_of_time ? 1.0 : 0.0;
+    fit.flaw_sigma[flaw] = std::hypot(fit.flaw_sigma[flaw], power * sigma_clock * fit.flaws.*servo_flaws[flaw]);
+  }
+}
+
+void count_time_stamps(std::span<const ServoSample> log, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse,
+                       ServoIdentification& result) {
+  const Eigen::VectorXd rate = -J.col(ServoParam::latency);
+  const TimeVariance variance = time_variance(result, rate);
+  if (!(variance.score > sigmas_of_time_stamps)) return;
+  result.sigma_time_s = std::sqrt(variance.value);
+  result.sigma_time_score = variance.score;
+  ServoFit& fit = result.fit;
+  const Eigen::VectorXd blur = 0.5 * variance.value * slope_of(log, rate);
+  const Eigen::VectorXd follow = inverse * (J.transpose() * blur);
+  fit.cov += follow.head<num_servo_params>() * follow.head<num_servo_params>().transpose();
+  fit.cov(ServoParam::latency, ServoParam::latency) += 3.0 * variance.value;
+  for (std::size_t i = 0; i < fit.freed.size(); ++i) {
+    double& sigma = fit.flaw_sigma[fit.freed[i]];
+    sigma = std::hypot(sigma, follow[num_servo_params + static_cast<Index>(i)]);
+  }
+}
+
+}  // namespace alidade

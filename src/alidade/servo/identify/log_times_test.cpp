@@ -1,0 +1,127 @@
+#include "alidade/servo/identify/log_times.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <variant>
+
+#include "alidade/identify.h"
+#include "alidade/servo/identify/identify_flaws.h"
+#include "alidade/simulate/draws.h"
+#include "alidade/testing/servo_sample.h"
+#include "alidade/testing/trials.h"
+
+namespace alidade {
+namespace {
+
+using testing::late_scene;
+using testing::log_of;
+
+ServoLogScene scene_of(bool is_rate_plant, bool is_chirp) {
+  ServoLogScene scene = late_scene(is_rate_plant, {0.3, AngleUnit::deg, 0.1});
+  scene.is_chirp = is_chirp;
+  return scene;
+}
+
+/// The log of an axis whose angles have other time stamps than its commands.
+std::vector<ServoSample> with_clock(std::vector<ServoSample> log, double factor) {
+  for (ServoSample& row : log) {
+    row.command_t_s = row.t_s;
+    row.t_s *= factor;
+  }
+  return log;
+}
+
+double error_in_sigma(const ServoFit& fit, const ServoLogScene& scene, int param) {
+  const ServoAxis& axis = scene.axis;
+  const std::array<double, 3> truth{gain_of(axis.plant), tau_of(axis.plant), axis.command_delay_s};
+  return (fit.params[param] - truth[static_cast<std::size_t>(param)]) / std::sqrt(fit.cov(param, param));
+}
+
+TEST(ServoLogTimes, AClockThatDriftsIsThatOfALogReadLater) {
+  for (const bool is_rate_plant : {false, true}) {
+    const std::vector<ServoSample> log = log_of(scene_of(is_rate_plant, true), 1);
+    const ServoFit fit = identify_servo(log).fit;
+    const Eigen::VectorXd exact = servo_response(with_clock(log, 1.002), fit.kind, fit.params).angle_rad;
+    EXPECT_LT((flawed_response(log, fit, {.clock_rate = 0.002}) - exact).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
+/// A drift of 0.1 % was a second lag, with a time constant 8σ and a latency 15σ off at a good verdict.
+TEST(ServoLogTimes, AClockThatDriftsIsEstimated) {
+  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
+  double sum2 = 0.0;
+  for (const bool is_rate_plant : {false, true}) {
+    for (const bool is_chirp : {false, true}) {
+      for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+        const ServoLogScene scene = scene_of(is_rate_plant, is_chirp);
+        const ServoFit fit = identify_servo(with_clock(log_of(scene, seed), 1.001)).fit;
+        ASSERT_EQ(std::ranges::count(fit.freed, ServoFlaw::clock_rate), 1) << is_rate_plant << is_chirp << seed;
+        const double z = (fit.flaws.clock_rate - (1.0 / 1.001 - 1.0)) / fit.flaw_sigma[ServoFlaw::clock_rate];
+        sum2 += z * z;
+        for (int param = 0; param < 3; ++param) {
+          sum2 += std::pow(error_in_sigma(fit, scene, param), 2);
+          EXPECT_LT(std::abs(error_in_sigma(fit, scene, param)), 5.0) << is_rate_plant << is_chirp << seed << param;
+        }
+      }
+    }
+  }
+  const double num = 16.0 * static_cast<double>(draws);
+  EXPECT_LT(sum2 / num, 1.0 + 5.0 * std::sqrt(2.0 / num));
+}
+
+/// Of a log whose seconds are 0.1 % short nothing shows it: σ counts it, unless the clock is given as exact.
+TEST(ServoLogTimes, TheClockOfTheLogIsCounted) {
+  const ServoLogScene scene = scene_of(true, false);
+  std::vector<ServoSample> log = log_of(scene, 1);
+  for (ServoSample& row : log) row.t_s *= 1.001;
+  const Identification counted = identify(log);
+  EXPECT_EQ(counted.verdict.state, State::good);
+  EXPECT_LT(std::abs(error_in_sigma(counted.fit, scene, ServoParam::gain)), 2.0);
+  EXPECT_NEAR(counted.assumed[1].moves, 1.0, 0.1);
+  EXPECT_EQ(counted.assumed[1].moved, "gain_rad");
+  const Identification exact = identify(log, {.sigma_clock = 0.0});
+  EXPECT_GT(std::abs(error_in_sigma(exact.fit, scene, ServoParam::gain)), 5.0);
+  EXPECT_THROW(static_cast<void>(identify(log, {.sigma_clock = -1.0})), ConfigError);
+}
+
+/// The angles of a log read up to so much later than their rows say.
+std::vector<ServoSample> read_late(std::vector<ServoSample> log, const ServoLogScene& scene, double most_s,
+                                   std::uint64_t seed) {
+  const bool is_rate_plant = std::holds_alternative<RatePlant>(scene.axis.plant);
+  ServoParams truth;
+  truth << gain_of(scene.axis.plant), tau_of(scene.axis.plant), scene.axis.command_delay_s, 0.0, 0.0;
+  const ServoKind kind = is_rate_plant ? ServoKind::rate : ServoKind::angle;
+  std::vector<ServoSample> later = log;
+  Draws draws(seed);
+  for (ServoSample& row : later) {
+    row.command_t_s = row.t_s;
+    row.t_s += draws.uniform(0.0, most_s);
+  }
+  const Eigen::VectorXd added =
+      servo_response(later, kind, truth).angle_rad - servo_response(log, kind, truth).angle_rad;
+  for (std::size_t i = 0; i < log.size(); ++i) log[i].angle_rad += added[static_cast<Eigen::Index>(i)];
+  return log;
+}
+
+/// Angles read 0 to 6 ms after their time stamps passed for a latency 10 to 20σ shorter.
+TEST(ServoLogTimes, StampsThatErrAreCounted) {
+  const auto draws = static_cast<std::uint64_t>(testing::trials(4));
+  std::uint64_t num_clean_seen = 0;
+  for (const bool is_rate_plant : {false, true}) {
+    const ServoLogScene scene = scene_of(is_rate_plant, true);
+    for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+      const std::vector<ServoSample> log = log_of(scene, seed);
+      num_clean_seen += identify_servo(log).sigma_time_s > 0.0 ? 1 : 0;
+      const ServoIdentification identified = identify_servo(read_late(log, scene, 0.006, seed));
+      EXPECT_NEAR(identified.sigma_time_s, 0.006 / std::sqrt(12.0), 4e-4) << is_rate_plant << seed;
+      EXPECT_LT(std::abs(error_in_sigma(identified.fit, scene, ServoParam::latency)), 3.0) << is_rate_plant << seed;
+    }
+  }
+  EXPECT_LE(num_clean_seen, 1 + draws / 25);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -11,6 +11,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <optional>
 #include <utility>
 
 #include "alidade/estimation/config_error.h"
@@ -339,6 +340,9 @@ int App::dispatch(int argc, const char* const* argv) {
   const tbb::global_control limit = prepare_libraries(options.threads);
   Run run(command.spec.name, {argv, argv + argc}, options, state_->terminal->progress(!options.quiet && !options.json));
   if (command.spec.draws_random_numbers) run.document.seed = options.seed;
+  const CLI::Option* live = command.app->get_option_no_throw("--live");
+  std::optional<StopsAtOnce> stops;
+  if (command.spec.writes_at_end && (live == nullptr || live->count() == 0)) stops.emplace();
   try {
     const ExitCode code = command.work(run);
     state_->terminal->wipe_progress();

@@ -21,6 +21,8 @@ struct CommandSpec {
   std::string examples;               ///< Command lines, one per line; shown at the end of --help.
   bool draws_random_numbers = false;  ///< Gives it --seed.
   bool leaves_results = true;         ///< False: nothing is written into DIR unless --out is given (show, convert).
+  /// Writes nothing before Run::finish, but with --live: Ctrl-C ends it at once, wherever it is.
+  bool writes_at_end = false;
 };
 
 /// An option of a command, or one of its arguments.

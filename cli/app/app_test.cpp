@@ -31,8 +31,9 @@ std::function<ExitCode(cli::Run&)> work_of_test;
 
 void add_test_commands(App& app) {
   auto length = std::make_shared<double>(1.0);
-  CLI::App& command = app.add_command({"work", "Does what the test says", "  alidade work --length 2", true},
-                                      [](cli::Run& run) { return work_of_test(run); });
+  CLI::App& command =
+      app.add_command({"work", "Does what the test says", "  alidade work --length 2", true, true, true},
+                      [](cli::Run& run) { return work_of_test(run); });
   command.add_option("--length", *length, "A length [m]")->check(positive_number());
   app.add_group("camera", "Cameras");
   app.add_command({"camera show", "Shows a camera", "  alidade camera show a.yaml", false, false},
@@ -287,6 +288,45 @@ TEST(App, ASecondCtrlCDoesNotWaitForTheWork) {
     while (true) std::this_thread::sleep_for(std::chrono::seconds(1));
   };
   EXPECT_EQ(outcome_of({"work"}, deaf, interrupt_when_ready(ready, {SIGINT, SIGINT})).code, 130);
+}
+
+/// A fit that never looks whether it shall stop; what began to be written is not left in halves.
+TEST(App, WorkThatDoesNotLookIsStoppedAtOnceWhileNothingIsWritten) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const TemporaryFolder folder;
+    const std::string out = (folder.path() / "out").string(), ready = (folder.path() / "ready").string();
+    std::chrono::steady_clock::time_point sent;
+    const auto deaf = [&](cli::Run& run) -> ExitCode {
+      run.add_file("camera.yaml", "half");
+      write_file(ready, "");
+      while (true) std::this_thread::sleep_for(std::chrono::seconds(1));
+    };
+    const Outcome outcome = outcome_of({"work", "--out", out.c_str()}, deaf, [&](pid_t child) {
+      interrupt_when_ready(ready, {signal})(child);
+      sent = std::chrono::steady_clock::now();
+    });
+    EXPECT_LT(std::chrono::steady_clock::now() - sent, std::chrono::seconds(2));  // 0.3 s, and a busy machine
+    EXPECT_EQ(outcome.code, 128 + signal);
+    EXPECT_THAT(outcome.err, is_fault("interrupted; nothing written"));
+    EXPECT_FALSE(std::filesystem::exists(out));
+  }
+}
+
+TEST(App, WhatHasBegunToBeWrittenIsNotStoppedInTheMiddle) {
+  const TemporaryFolder folder;
+  const std::filesystem::path there = folder.path() / "there";
+  const std::string out = (folder.path() / "out").string(), ready = (folder.path() / "ready").string();
+  std::filesystem::create_directory(there);
+  const auto slow = [&](cli::Run& run) {
+    run.add_file_elsewhere(there / "file", "whole");
+    write_file(ready, "");
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    return run.finish(good());
+  };
+  const Outcome outcome = outcome_of({"work", "--out", out.c_str()}, slow, interrupt_when_ready(ready, {SIGTERM}));
+  EXPECT_EQ(outcome.code, 143);
+  EXPECT_TRUE(std::filesystem::is_empty(there));
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 TEST(App, ProgressIsShownOnATerminalAndWipedBeforeTheResult) {

@@ -68,6 +68,7 @@ void Run::add_file(std::string name, std::string content) {
 }
 
 void Run::add_file_elsewhere(const std::filesystem::path& file, std::string_view content) {
+  begin_writing();
   elsewhere_.emplace_back(file.parent_path()).add(file.filename(), content);
 }
 
@@ -80,11 +81,13 @@ ExitCode Run::finish(Verdict verdict) {
   settle(document);
   document.seconds.insert(document.seconds.begin(), {"total", seconds_since(start_)});
   if (options.keeps_outcome) {
+    begin_writing();
     for (FolderSwap& swap : elsewhere_) swap.commit();
     return document.verdict.exit_code;
   }
   result_ = result_text_of_size(document,
                                 [&](std::string name, std::string csv) { add_file(std::move(name), std::move(csv)); });
+  begin_writing();
   report_progress(progress, "writing", 0, 0);
   if (options.leaves_results) {
     write_files();

@@ -6,16 +6,38 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <ctime>
 #include <mutex>
 
 namespace alidade::cli {
 namespace {
 
 std::atomic<int> stop_signal{0};  // a signal handler can reach nothing but a global
-static_assert(std::atomic<int>::is_always_lock_free);
+std::atomic<int> people{-1};      // where lines for people go; a terminal's line is wiped before them
+std::atomic<bool> is_on_terminal{false}, has_nothing_written{false}, has_patience{false};
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+timer_t patience;
+
+void write_text(int to, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(to, text.data(), text.size());
+    if (written <= 0) return;  // no reader: nowhere to report it either
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
 
 extern "C" void on_interrupt(int signal) {
   if (stop_signal.exchange(signal) != 0) ::_exit(128 + signal);  // the second one does not wait
+  constexpr itimerspec once{{0, 0}, {0, 300'000'000}};
+  if (has_patience) ::timer_settime(patience, 0, &once, nullptr);
+}
+
+/// A fit that has not come by where it asks: it is in memory alone. What has begun to be written is not disturbed.
+extern "C" void on_patience_end(int) {
+  if (stop_signal == 0 || !has_nothing_written) return;
+  if (is_on_terminal) write_text(people, "\r\033[K");
+  write_text(people, "alidade: error: interrupted; nothing written\n");
+  ::_exit(128 + stop_signal);
 }
 
 /// Called instead of ending the process: the write that failed says so itself. Not ignored: a program that is started
@@ -29,14 +51,6 @@ constexpr bool is_sanitized() {
 #else
   return false;
 #endif
-}
-
-void write_text(int to, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(to, text.data(), text.size());
-    if (written <= 0) return;  // no reader: nowhere to report it either
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
 }
 
 }  // namespace
@@ -74,6 +88,8 @@ std::weak_ptr<Terminal::State>& Terminal::current() {
 
 Terminal::Terminal() : state_(std::make_shared<State>()) {
   current() = state_;
+  people = state_->people;
+  is_on_terminal = state_->is_terminal;
   if (is_sanitized()) return;
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   if (nowhere < 0) return;
@@ -132,6 +148,26 @@ void catch_interrupts() {
   ::sigaction(SIGPIPE, &action, nullptr);  // stdout has no reader any more
   ::sigaction(SIGXFSZ, &action, nullptr);  // a file beyond the size that this process may write
 }
+
+StopsAtOnce::StopsAtOnce() {
+  struct sigaction action {};
+  action.sa_handler = on_patience_end;
+  ::sigemptyset(&action.sa_mask);
+  action.sa_flags = SA_RESTART;
+  ::sigaction(SIGALRM, &action, nullptr);
+  sigevent event{};
+  event.sigev_notify = SIGEV_SIGNAL;
+  event.sigev_signo = SIGALRM;
+  has_nothing_written = true;
+  has_patience = ::timer_create(CLOCK_MONOTONIC, &event, &patience) == 0;
+}
+
+StopsAtOnce::~StopsAtOnce() {
+  has_nothing_written = false;
+  if (has_patience.exchange(false)) ::timer_delete(patience);
+}
+
+void begin_writing() { has_nothing_written = false; }
 
 void hold_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {

@@ -46,6 +46,17 @@ void hold_standard_streams();
 /// From now on the first SIGINT or SIGTERM asks the work to stop, and the second ends the process at once. A write to
 /// a closed pipe, or beyond the largest size of a file, fails instead of ending the process.
 void catch_interrupts();
+/// While it exists, work that has not stopped 0.3 s after it was asked to is ended as Interrupted ends it, with its
+/// line and its exit code: work that writes nothing until begin_writing(), and has no other program to stop first.
+class StopsAtOnce {
+ public:
+  StopsAtOnce();
+  ~StopsAtOnce();
+  StopsAtOnce(const StopsAtOnce&) = delete;
+  StopsAtOnce& operator=(const StopsAtOnce&) = delete;
+};
+/// From here on it ends by itself: look once more at interrupting_signal(), then write.
+void begin_writing();
 /// The signal that asked to stop; 0 if none did.
 [[nodiscard]] int interrupting_signal();
 /// The signal has been handled without ending the work: the next one asks again.

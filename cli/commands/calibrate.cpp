@@ -195,7 +195,8 @@ void add_calibrate(App& app) {
                    "alidade calibrate --corners corners.csv --size 640x480 --board 9x6 --square 0.025\n"
                    "alidade calibrate water/*.png --board 9x6 --square 0.025 --model flat_port --air camera_air.yaml "
                    "--glass 0.01\n"
-                   "alidade calibrate --live --board 9x6 --square 0.025 --until 0.2px --out mycamera\n"},
+                   "alidade calibrate --live --board 9x6 --square 0.025 --until 0.2px --out mycamera\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_calibrate(*args, run); });
   add_photos(command, args->photos);
   add_capture_options(command, args->capture);

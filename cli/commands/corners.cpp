@@ -53,7 +53,8 @@ void add_corners(App& app) {
        .summary = "The corners of a board in photos, each with its full covariance",
        .examples = "alidade corners photos/ --board 9x6 --square 0.025 --out corners\n"
                    "alidade corners photos/*.jpg --board 9x6 --square 0.025 --csv > corners.csv\n"
-                   "alidade calibrate --corners corners/corners.csv --size 640x480 --board 9x6 --square 0.025\n"},
+                   "alidade calibrate --corners corners/corners.csv --size 640x480 --board 9x6 --square 0.025\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_corners(*args, run); });
   add_photos(command, args->photos, true);
   app.add_fields(command, fields_of(*args));

@@ -45,7 +45,8 @@ void add_identify(App& app) {
            "Gain, time constant, latency, limits, dead band and backlash of one axis of a pan-tilt head from a log of "
            "commands and angles",
        .examples = "  alidade identify log.csv\n"
-                   "  alidade simulate servo --chirp --out sim && alidade identify sim/log.csv\n"},
+                   "  alidade simulate servo --chirp --out sim && alidade identify sim/log.csv\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_identify(*args, run); });
   command
       .add_option(

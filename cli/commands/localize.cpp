@@ -319,7 +319,8 @@ void add_localize(App& app) {
                    "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"
                    "alidade localize sights.csv --camera camera.yaml --depth-sensor depth.csv\n"
                    "alidade localize sights.csv --camera camera.yaml --range ranges.csv --beam rangefinder.yaml\n"
-                   "alidade localize sights.csv --camera camera.yaml --imu imu.csv --imu-mounting imu.yaml\n"},
+                   "alidade localize sights.csv --camera camera.yaml --imu imu.csv --imu-mounting imu.yaml\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_localize(*args, run); });
   command
       .add_option(

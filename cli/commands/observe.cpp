@@ -181,13 +181,13 @@ void add_observe(App& app) {
   CLI::App& command = app.add_command(
       {.name = "observe",
        .summary = "Intrinsics of a camera that pans, tilts and zooms, from what it sees while it rotates",
-       .examples =
-           "alidade observe log.csv --size 780x582\n"
-           "alidade observe log.csv --camera prior.yaml --estimate k1,mount,delay\n"
-           "alidade observe --video ptz.mp4 --angles encoder.csv --rate 30\n"
-           "alidade observe log.csv --method fang2011 --profile quiet --start 500,510,400,300\n"
-           "alidade observe photos/*.jpg --rotation free\n"
-           "alidade observe --pairs matches.csv --rotation free --square-pixels --fix-centre --size 1280x960\n"},
+       .examples = "alidade observe log.csv --size 780x582\n"
+                   "alidade observe log.csv --camera prior.yaml --estimate k1,mount,delay\n"
+                   "alidade observe --video ptz.mp4 --angles encoder.csv --rate 30\n"
+                   "alidade observe log.csv --method fang2011 --profile quiet --start 500,510,400,300\n"
+                   "alidade observe photos/*.jpg --rotation free\n"
+                   "alidade observe --pairs matches.csv --rotation free --square-pixels --fix-centre --size 1280x960\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_observe(*args, run); });
   command.add_option(
       "log", args->inputs,

@@ -30,7 +30,8 @@ void add_plan(App& app) {
   auto args = std::make_shared<PlanArgs>();
   CLI::App& command = app.add_command({.name = "plan calibrate",
                                        .summary = "The board poses whose photos lower the uncertainty most",
-                                       .examples = "alidade plan calibrate alidade-out/calibrate --photos 3\n"},
+                                       .examples = "alidade plan calibrate alidade-out/calibrate --photos 3\n",
+                                       .writes_at_end = true},
                                       [args](Run& run) { return plan_calibrate(*args, run); });
   command.add_option("result", args->result, "Folder or result.json of a calibration")->required();
   app.add_fields(command, fields_of(args->config));

@@ -28,7 +28,8 @@ void add_plan_observe(App& app) {
   CLI::App& command =
       app.add_command({.name = "plan observe",
                        .summary = "The rotations of the head that lower the uncertainty most",
-                       .examples = "alidade plan observe alidade-out/observe --moves 3 --rate-deg-s 15\n"},
+                       .examples = "alidade plan observe alidade-out/observe --moves 3 --rate-deg-s 15\n",
+                       .writes_at_end = true},
                       [args](Run& run) { return plan_observe(*args, run); });
   command.add_option("result", args->result, "Folder or result.json of an observation")->required();
   app.add_fields(command, fields_of(args->config));

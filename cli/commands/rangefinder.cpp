@@ -161,7 +161,8 @@ void add_rangefinder(App& app) {
        .examples = "alidade rangefinder shots.csv --camera camera.yaml --board 9x6 --square 0.04\n"
                    "alidade rangefinder shots.csv --camera camera.yaml --method spot --spot red\n"
                    "alidade rangefinder shots.csv --camera camera.yaml --method plane --scale --sigma-range-m 0.01\n"
-                   "alidade rangefinder --live --camera camera.yaml --board 9x6 --square 0.04 --out mybeam\n"},
+                   "alidade rangefinder --live --camera camera.yaml --board 9x6 --square 0.04 --out mybeam\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_rangefinder(*args, run); });
   command.add_option("shots", args->shots,
                      "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane); none "

@@ -110,7 +110,8 @@ void add_rig(App& app) {
            "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025\n"
            "alidade rig views.csv --camera left.yaml --camera right.yaml --board 9x6 --square 0.025\n"
            "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025 --sigma-angle 0.0003\n"
-           "alidade rig sights.csv --moving-target --clocks 60 --truth gnss.csv --camera a.yaml --camera b.yaml\n"},
+           "alidade rig sights.csv --moving-target --clocks 60 --truth gnss.csv --camera a.yaml --camera b.yaml\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_rig(*args, run); });
   command
       .add_option("views", args->views,

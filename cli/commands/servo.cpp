@@ -95,7 +95,8 @@ void add_servo(App& app) {
                    "  alidade servo scenario.yaml --controller mpc --latency-ms 100 --seeds 20\n\n"
                    "scenario.yaml; every key may be omitted, these are the values it then has:\n\n" +
                    servo_scenario_text(),
-       .draws_random_numbers = true},
+       .draws_random_numbers = true,
+       .writes_at_end = true},
       [args](Run& run) { return run_servo_command(*args, run); });
   command.add_option("scenario", args->scenario, "YAML: target, heads, plant, delays, noise, controllers; see below")
       ->required();

@@ -179,7 +179,8 @@ void add_track(App& app) {
                    "alidade track events.csv --rig rig.yaml --truth truth.csv --method xiahou2015\n"
                    "alidade track events.csv --rig rig.yaml --intrinsics left/intrinsics.csv right/intrinsics.csv\n"
                    "alidade track --video left.mp4 right.mp4 --angles angles.csv --rate 30 --rig rig.yaml \\\n"
-                   "  --look colour:230,70,20\n"},
+                   "  --look colour:230,70,20\n",
+       .writes_at_end = true},
       [args](Run& run) { return run_track(*args, run); });
   command.add_option(
       "events", args->events,

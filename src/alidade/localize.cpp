@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "alidade/localize/checks/judge.h"
+#include "alidade/localize/checks/lens_kind.h"
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
 #include "alidade/localize/frames/image_localizer.h"
@@ -118,6 +119,12 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
   result.counts = {result.path.size(), result.path.size() - result.num_lost, result.num_lost, {}};
   result.assumed = localize_assumed(result);
   result.verdict = localize_verdict(result);
+  std::optional<OtherLensKind> other;
+  if (run.of_images)
+    other = other_lens_kind(run.of_images->frames(), run.of_images->target(), run.config, result);
+  else if (run.of_observations)
+    other = other_lens_kind(run.of_observations->frames(), run.config.target.points, run.config, result);
+  if (other) add_lens_kind(*other, result);
   return result;
 }
 

@@ -26,6 +26,9 @@ class ImageLocalizer {
   PathStep take(const cv::Mat& grey, long frame, double t_s);
   /// `result` has the path; the rest is filled in, and the path smoothed.
   void sum_up(Localization& result) const;
+  /// What was matched in images, as it is kept for it, and the target's points by their numbers there.
+  [[nodiscard]] const std::vector<ObservationFrame>& frames() const { return kept_.frames(); }
+  [[nodiscard]] std::span<const KnownPoint> target() const { return given_; }
   /// The map for another run to begin in: `result` as it is given.
   void save_map(Localization& result) const;
   /// Of the last image.

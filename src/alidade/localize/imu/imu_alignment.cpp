@@ -14,28 +14,39 @@
 namespace alidade {
 namespace {
 
-/// Mean force over gravity, of the readings that are of the path's time.
-std::optional<double> mean_force(const Imu& imu, std::span<const TimedPose> path) {
-  double sum = 0.0, num = 0.0;
+constexpr double little = 0.5;  // of the camera's rates: less in common with the IMU's is chance
+
+struct ForceSize {
+  double mean = 0.0;    ///< Over gravity.
+  double spread = 0.0;  ///< Over the mean.
+};
+
+/// How large forces are, of the readings that are of the path's time.
+std::optional<ForceSize> force_size(const Imu& imu, std::span<const TimedPose> path) {
+  double sum = 0.0, squares = 0.0, num = 0.0;
   for (const ImuReading& reading : imu.readings) {
     if (reading.t_s < path.front().t_s || reading.t_s > path.back().t_s) continue;
     sum += reading.force_m_s2.norm();
+    squares += reading.force_m_s2.squaredNorm();
     num += 1.0;
   }
   constexpr double few = 10.0;
-  return num < few ? std::nullopt : std::optional(sum / num / imu.gravity_m_s2);
+  if (num < few) return std::nullopt;
+  const double mean = sum / num, variance = std::max(squares / num - mean * mean, 0.0);
+  return ForceSize{mean / imu.gravity_m_s2, std::sqrt(variance) / std::max(mean, 1e-9)};
 }
 
-ImuFault force_fault(double mean) {
-  constexpr double near = 0.3, in_g = 1.0 / 9.81, none = 0.3;
-  if (std::abs(mean - 1.0) < near) return ImuFault::none;
-  if (std::abs(mean / in_g - 1.0) < near) return ImuFault::force_g;
-  return mean < none ? ImuFault::no_gravity : ImuFault::force_unit;
+/// Forces in g are gravity, most of them, and of nearly one size; accelerations alone are not.
+ImuFault force_fault(const ForceSize& force) {
+  constexpr double near = 0.3, in_g = 1.0 / 9.81, none = 0.3, nearly_one_size = 0.25;
+  if (std::abs(force.mean - 1.0) < near) return ImuFault::none;
+  if (std::abs(force.mean / in_g - 1.0) < near && force.spread < nearly_one_size) return ImuFault::force_g;
+  return force.mean < none ? ImuFault::no_gravity : ImuFault::force_unit;
 }
 
 /// What is wrong with the rates, as far as the camera rotates.
 ImuFault rates_fault(const RateMatch& match, ImuEstimate& estimate) {
-  constexpr double hardly_rad_s = 0.02, little = 0.5, certain_chi2 = 30.0, near = 0.05, certain = 5.0;
+  constexpr double hardly_rad_s = 0.02, certain_chi2 = 30.0, near = 0.05, certain = 5.0;
   if (match.num == 0) return ImuFault::other_time;
   if (match.signal_rad_s < hardly_rad_s) return ImuFault::none;
   if (match.explained < little) return ImuFault::other_motion;
@@ -59,6 +70,7 @@ ImuFault mount(const Imu& imu, const RateMatch& match, ImuEstimate& estimate) {
     const Eigen::Matrix3d weight =
         (Eigen::Matrix3d::Identity() + given * information).partialPivLu().solve(information);
     estimate.angle_rad = off.norm();
+    if (match.explained < little) return ImuFault::none;  // of a camera that hardly rotates
     if (!(off.dot(weight * off) > certain_chi2)) return ImuFault::none;
     estimate.cam_from_imu.rotation = match.cam_from_imu;
     return ImuFault::mounting;
@@ -209,11 +221,12 @@ ImuAlignment align_imu(const Imu& imu, std::span<const TimedPose> path) {
     estimate.fault = ImuFault::few;
     return out;
   }
-  const std::optional<double> mean = mean_force(imu, path);
-  estimate.fault = mean ? force_fault(*mean) : ImuFault::other_time;
-  estimate.ratio = mean.value_or(1.0);
+  const std::optional<ForceSize> force = force_size(imu, path);
+  estimate.fault = force ? force_fault(*force) : ImuFault::other_time;
+  estimate.ratio = force ? force->mean : 1.0;
   if (estimate.fault != ImuFault::none) return out;
-  const RateMatch match = match_rates(imu.readings, path);
+  RateMatch match = match_rates(imu.readings, path);
+  if (match.explained < little) match.late_s = 0.0;
   estimate.fault = rates_fault(match, estimate);
   if (estimate.fault == ImuFault::none) estimate.fault = mount(imu, match, estimate);
   estimate.late_s = match.late_s;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <numbers>
 
 #include "alidade/geometry/similarity.h"
@@ -48,6 +49,36 @@ ImuRun swinging(std::uint64_t seed, ImuScene scene = {}) {
     if (point.is_known) run.target.push_back({point.id, point.given_in_world, world.sigma_known_m});
   run.imu = simulate_imu(scene, sequence.world_from_cam, -0.5, run.truth.back().t_s + 0.5, seed + 100);
   return run;
+}
+
+/// A camera on any path before points at 0.6 to 1.6 m; the mounting is as given.
+ImuRun moving(const std::function<Rigid3(double)>& world_from_cam, std::uint64_t seed) {
+  Draws draws(seed);
+  ImuRun run{underwater_camera(), {}, {}, {}, {}, {}, {}};
+  run.given = run.scene.mounting;
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 80; ++i)
+    points.emplace_back(draws.uniform(-1.0, 1.0), draws.uniform(-0.8, 0.8), draws.uniform(0.6, 1.6));
+  constexpr int num_frames = 240;
+  for (long k = 0; k < num_frames; ++k) {
+    const double t_s = static_cast<double>(k) / 30.0;
+    ObservationFrame seen{k, t_s, {}};
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto px = project(run.camera, world_from_cam(t_s).inverse() * points[i]);
+      if (!px || px->x() < 0.0 || px->y() < 0.0 || px->x() > run.camera.width_px || px->y() > run.camera.height_px)
+        continue;
+      const Eigen::Vector2d noise(draws.normal(), draws.normal());
+      seen.observations.push_back({static_cast<long>(i), *px + 0.5 * noise, 0.0});
+    }
+    run.truth.push_back({t_s, world_from_cam(t_s)});
+    run.frames.push_back(std::move(seen));
+  }
+  run.imu = simulate_imu(run.scene, world_from_cam, -0.5, run.truth.back().t_s + 0.5, seed + 100);
+  return run;
+}
+
+Eigen::Vector3d swing(double size, double t_s) {
+  return size * Eigen::Vector3d(std::sin(1.9 * t_s), std::sin(2.3 * t_s + 1.0), std::sin(1.6 * t_s + 2.0));
 }
 
 LocalizeConfig with_imu(const ImuRun& run) {
@@ -229,6 +260,74 @@ TEST(LocalizeImu, FaultsAreNamedAndNotUsed) {
   EXPECT_EQ(
       fault_of([&](Imu& imu) { each_of(imu, [](ImuReading& r) { std::swap(r.force_m_s2.x(), r.force_m_s2.z()); }); }),
       ImuFault::misfit);
+}
+
+/// Whoever removes gravity removes what tells the mounting's errors from accelerations.
+TEST(LocalizeImu, GravityThatWasSubtractedIsNamed) {
+  for (const double size_m : {0.05, 0.25}) {  // accelerations of 0.2 and 1.2 m/s², as much as gravity in g
+    const auto path = [&](double t_s) { return Rigid3{exp_so3(swing(0.1, t_s)), swing(size_m, t_s)}; };
+    ImuRun run = moving(path, 21);
+    for (ImuReading& each : run.imu.readings) {
+      const Eigen::Quaterniond imu_in_world =
+          (path(each.t_s).rotation * run.scene.mounting.cam_from_imu.rotation).normalized();
+      each.force_m_s2 += imu_in_world.conjugate() * run.scene.gravity_in_world;
+    }
+    const Localization result = localize(run.frames, run.camera, with_imu(run), {});
+    ASSERT_TRUE(result.imu);
+    EXPECT_FALSE(result.scale_known) << size_m;
+    EXPECT_NE(result.verdict.sentence.find("gravity"), std::string::npos) << result.verdict.sentence;
+    EXPECT_NE(result.verdict.sentence.find("subtracted"), std::string::npos) << result.verdict.sentence;
+  }
+}
+
+/// At a constant velocity forces are the same whatever the unit of length.
+TEST(LocalizeImu, AtAConstantVelocityTheScaleIsUnknown) {
+  int num_solved = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (const double turn_rad : {0.0, 0.15}) {
+      const ImuRun run = moving(
+          [&](double t_s) {
+            return Rigid3{exp_so3(swing(turn_rad, t_s)), Eigen::Vector3d(-0.3 + 0.08 * t_s, 0.1 - 0.02 * t_s, 0.0)};
+          },
+          seed);
+      const Localization result = localize(run.frames, run.camera, with_imu(run), run.truth);
+      ASSERT_TRUE(result.imu);
+      EXPECT_FALSE(result.scale_known);
+      EXPECT_EQ(result.verdict.state, State::care);
+      EXPECT_NE(result.verdict.sentence.find("IMU"), std::string::npos) << result.verdict.sentence;
+      if (!result.is_smoothed) continue;  // a filter's rotations are not good enough to say that forces are constant
+      ++num_solved;
+      EXPECT_EQ(result.imu->fault, ImuFault::still)
+          << seed << ", " << turn_rad << ": " << result.verdict.sentence << ", scale " << result.imu->scale << " ± "
+          << result.imu->sigma_scale << ", true " << 1.0 / scale_of(result, run);
+      EXPECT_NE(result.verdict.sentence.find("accelerates too little for the IMU"), std::string::npos)
+          << result.verdict.sentence;
+    }
+  }
+  EXPECT_GE(num_solved, 4);
+}
+
+/// Without a given mounting rotations have to determine it: about one axis they leave the rotation about it free.
+TEST(LocalizeImu, AMountingThatRotationsDoNotDetermineIsNamed) {
+  for (const double turn_rad : {0.0, 0.2}) {
+    const ImuRun run = moving(
+        [&](double t_s) {
+          return Rigid3{exp_so3(Eigen::Vector3d(0.0, swing(turn_rad, t_s).x(), 0.0)), swing(0.1, t_s)};
+        },
+        31);
+    LocalizeConfig config = with_imu(run);
+    const Localization with = localize(run.frames, run.camera, config, run.truth);
+    ASSERT_TRUE(with.imu);
+    EXPECT_EQ(with.imu->fault, ImuFault::none) << turn_rad << ": " << with.verdict.sentence;
+    EXPECT_NEAR(std::log(scale_of(with, run)), 0.0, 3.5 * with.imu->sigma_scale);
+    config.imu->mounting.reset();
+    const Localization without = localize(run.frames, run.camera, config, run.truth);
+    ASSERT_TRUE(without.imu);
+    EXPECT_EQ(without.imu->fault, ImuFault::unmounted) << turn_rad << ": " << without.verdict.sentence;
+    EXPECT_FALSE(without.scale_known);
+    EXPECT_NE(without.verdict.sentence.find("no mounting of the IMU is given"), std::string::npos)
+        << without.verdict.sentence;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include "alidade/localize.h"
+#include "alidade/testing/hover.h"
+
+// A camera file of another kind of lens than the one that was used.
+
+namespace alidade {
+namespace {
+
+using testing::Hover;
+using testing::hovering;
+using testing::HoverLens;
+using testing::HoverRun;
+
+/// What calibrates so: everything of a lens but its kind is known well.
+Camera as_kind(const char* kind, const Camera& camera) {
+  Camera other = camera;
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(params(*make_lens(kind)).size());
+  values.head<4>() = params(camera.lens).head<4>();
+  other.lens = with_params(*make_lens(kind), values);
+  other.cov = Eigen::MatrixXd::Identity(values.size(), values.size()) * 1e-6;
+  other.cov.diagonal().head<4>().setConstant(1.0);
+  return other;
+}
+
+Camera sure(Camera camera, double focal = 1.0) {
+  Eigen::VectorXd values = params(camera.lens);
+  values.head<2>() *= focal;
+  camera.lens = with_params(camera.lens, values);
+  camera.cov = Eigen::MatrixXd::Identity(values.size(), values.size()) * 1e-6;
+  camera.cov.diagonal().head<4>().setConstant(1.0);
+  return camera;
+}
+
+Localization located(const HoverRun& run, const Camera& camera) {
+  LocalizeConfig config;
+  config.target.points = run.target;
+  return localize(run.frames, camera, config);
+}
+
+HoverRun brief_run(HoverLens lens, std::uint64_t seed) {
+  Hover scene;
+  scene.lens = lens;
+  scene.num_frames = 90;
+  scene.num_others = 40;
+  return hovering(scene, seed);
+}
+
+bool names(const Localization& result, const std::string& what) {
+  return result.verdict.sentence.find(what) != std::string::npos;
+}
+
+TEST(LensKind, AnotherKindForAFisheyeIsNamed) {
+  const HoverRun run = brief_run(HoverLens::fisheye, 1);
+  for (const char* kind : {"pinhole", "brown"}) {
+    const Localization result = located(run, as_kind(kind, run.camera));
+    EXPECT_GE(result.verdict.state, State::bad);
+    EXPECT_TRUE(names(result, ": a fisheye (kannala_brandt) of focal length 29")) << result.verdict.sentence;
+    EXPECT_TRUE(names(result, "calibrate with --model kannala_brandt")) << result.verdict.sentence;
+  }
+}
+
+TEST(LensKind, APinholeForALensThatDistortsIsNamed) {
+  const HoverRun run = brief_run(HoverLens::brown, 2);
+  const Localization result = located(run, as_kind("pinhole", run.camera));
+  EXPECT_GE(result.verdict.state, State::bad);
+  EXPECT_TRUE(names(result, "the lens is not a pinhole")) << result.verdict.sentence;
+}
+
+/// Another setting of the same lens is not another kind.
+TEST(LensKind, TheRightKindIsNotDoubted) {
+  for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye}) {
+    const HoverRun run = brief_run(lens, 3);
+    const Localization plain = located(run, as_kind(std::string(model_name(run.camera.lens)).c_str(), run.camera));
+    EXPECT_FALSE(names(plain, "calibrate with --model")) << static_cast<int>(lens) << ": " << plain.verdict.sentence;
+    for (const double focal : {1.05, 1.34}) {
+      const Localization result = located(run, sure(run.camera, focal));
+      EXPECT_FALSE(names(result, "calibrate with --model"))
+          << static_cast<int>(lens) << ", " << focal << ": " << result.verdict.sentence;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade

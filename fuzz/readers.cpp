@@ -67,7 +67,7 @@ void read_any_rig(std::string_view bytes) {
 }
 
 void read_any_beam(std::string_view bytes) { (void)read_beam(MemoryFile(bytes).path()); }
-void read_any_lens_course(std::string_view bytes) { (void)read_lens_course(MemoryFile(bytes).path()); }
+void read_any_intrinsics_history(std::string_view bytes) { (void)read_intrinsics_history(MemoryFile(bytes).path()); }
 
 void read_any_config(std::string_view bytes) {
   Board board;
@@ -257,7 +257,7 @@ constexpr std::array all_readers{
     Reader{"camera_parts", read_camera_parts},
     Reader{"rig", read_any_rig},
     Reader{"beam", read_any_beam},
-    Reader{"lens_course", read_any_lens_course},
+    Reader{"intrinsics_history", read_any_intrinsics_history},
     Reader{"config", read_any_config},
     Reader{"table", read_any_table},
     Reader{"corners", read_corner_table},

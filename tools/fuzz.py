@@ -24,7 +24,7 @@ SEEDS = {  # reader: files of the simulations below
     "fleet": ["fleet/*"],
     "head_url": ["urls/*"],
     "indi": ["indi/*"],
-    "lens_course": ["track/*intrinsics*", "rotation/*intrinsics*"],
+    "intrinsics_history": ["track/*intrinsics*", "rotation/*intrinsics*"],
     "live_message": ["messages/*"],
     "observations": ["underwater/*.csv"],
     "onvif": ["onvif/*"],

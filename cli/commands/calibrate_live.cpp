@@ -110,7 +110,7 @@ class FolderCapture {
 
   /// The remaining ones, the most informative first; repeated as long as a round gains something.
   void take_the_rest() {
-    session_.guide().take_what_comes(true);
+    session_.guide().accept_any_useful(true);
     for (bool has_kept = true; has_kept && !is_over();) {
       std::vector<Left> round = std::exchange(left_, {});
       std::ranges::stable_sort(round, std::ranges::greater{}, &Left::gain);
@@ -139,7 +139,7 @@ class FolderCapture {
 
 /// What was shown and not taken while better might come, the most informative first: nothing comes any more.
 void take_what_was_shown(live::CaptureSession& session, double t_s) {
-  session.guide().take_what_comes(true);
+  session.guide().accept_any_useful(true);
   while (interrupting_signal() == 0 && !session.look_back(t_s).file.empty())
     if (session.reached_goal({})) return;
 }

@@ -58,7 +58,7 @@ ExitCode project_beam(ProjectArgs args, Run& run) {
 ExitCode project_heads(const ProjectArgs& args, Run& run) {
   run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
-  if (!rig.lens_courses.empty())
+  if (!rig.intrinsics_histories.empty())
     throw InputError(args.rig.string() + ": intrinsics: change with time, which `project` is not given; give a camera");
   std::optional<Eigen::Vector3d> point_in_world;
   if (!args.point_m.empty()) point_in_world = Eigen::Vector3d(args.point_m.data());

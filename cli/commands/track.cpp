@@ -38,7 +38,7 @@ FieldList fields_of(TrackArgs& args) {
       look_field(args.look),
       {.name = "rate_hz",
        .value = &args.rate_hz,
-       .help = "Frames a second of the videos; angles are interpolated (default: one row of angles per frame)",
+       .help = "Frames per second of the videos; angles are interpolated (default: one row of angles per frame)",
        .limits = {.min = 0.0, .is_above_min = true}},
       {.name = "rig", .value = &args.rig, .help = "The heads and their cameras", .form = "FILE", .is_required = true},
       {.name = "truth",
@@ -60,15 +60,15 @@ void check_inputs(const TrackArgs& args) {
 }
 
 /// One file of intrinsics per head beats what rig.yaml names; - for a head that does not zoom.
-void read_courses(const TrackArgs& args, Rig& rig, Run& run) {
+void read_intrinsics_histories(const TrackArgs& args, Rig& rig, Run& run) {
   if (args.intrinsics.empty()) return;
   if (args.intrinsics.size() != rig.heads.size())
     throw UsageError(
         fmt::format("--intrinsics: the rig has {} heads, but {} files are given; - for a head that does not zoom",
                     rig.heads.size(), args.intrinsics.size()));
-  rig.lens_courses.clear();
+  rig.intrinsics_histories.clear();
   for (const std::string& file : args.intrinsics) {
-    rig.lens_courses.push_back(file == "-" ? LensCourse{} : read_lens_course(file));
+    rig.intrinsics_histories.push_back(file == "-" ? IntrinsicsHistory{} : read_intrinsics_history(file));
     if (file != "-") run.add_input("intrinsics", file);
   }
 }
@@ -137,7 +137,7 @@ ExitCode run_track(TrackArgs args, Run& run) {
   require_sense(args.config);
   run.add_input("rig", args.rig);
   Rig rig = read_rig(args.rig);
-  read_courses(args, rig, run);
+  read_intrinsics_histories(args, rig, run);
   TrueTrack truth;
   if (!args.truth.empty()) {
     run.add_input("truth", args.truth);
@@ -157,7 +157,8 @@ ExitCode run_track(TrackArgs args, Run& run) {
     frames = watch_videos(args, rig, live.progress(), run);
     events.observations = observations_of(frames);
   }
-  if (const std::string fault = lens_course_fault(events.observations, rig); !fault.empty()) throw InputError(fault);
+  if (const std::string fault = intrinsics_history_fault(events.observations, rig); !fault.empty())
+    throw InputError(fault);
   run.lap("read");
   const TargetTrack result = follow(args, std::move(events.observations), rig, truth, stream, live);
   run.lap("track");
@@ -175,7 +176,7 @@ void add_track(App& app) {
        .summary = "Path of a target in space from the pixels and angles of two or more pan-tilt heads",
        .examples = "alidade track events.csv --rig rig.yaml\n"
                    "alidade track events.csv --rig rig.yaml --method imm --predict 0.1\n"
-                   "tail -f events.csv | alidade track - --rig rig.yaml\n"
+                   "  tail -f events.csv | alidade track - --rig rig.yaml\n"
                    "alidade track events.csv --rig rig.yaml --truth truth.csv --method xiahou2015\n"
                    "alidade track events.csv --rig rig.yaml --intrinsics left/intrinsics.csv right/intrinsics.csv\n"
                    "alidade track --video left.mp4 right.mp4 --angles angles.csv --rate 30 --rig rig.yaml \\\n"

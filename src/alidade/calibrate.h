@@ -18,12 +18,12 @@ namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// From photos: the corners are found, the camera is solved, the corners are found again with it, and all is solved,
-/// studied and judged. Photos that show no board are named in `counts.skipped`. Throws ConfigError for a config or a
-/// board that cannot be, Interrupted where `progress` says stop; never for what the photos show.
+/// studied and judged. Photos that show no board are named in `counts.skipped`. Throws ConfigError for an invalid
+/// config or board, Interrupted where `progress` returns false; never for what the photos show.
 [[nodiscard]] Calibration calibrate(const Photos& photos, const Board& board, const CalibrateConfig& config = {},
                                     const Progress& progress = {});
 
-/// From corners that were found elsewhere, of images of that size.
+/// From corners detected by other means, in images of that size.
 [[nodiscard]] Calibration calibrate(std::vector<BoardView> views, const ImageSize& size, const Board& board,
                                     const CalibrateConfig& config = {}, const Progress& progress = {});
 

@@ -379,6 +379,6 @@ void CaptureGuide::correct(double worst_3sigma_px) {
   state.fill_state();
 }
 
-void CaptureGuide::take_what_comes(bool is_so) { state_->takes_what_comes = is_so; }
+void CaptureGuide::accept_any_useful(bool is_so) { state_->takes_what_comes = is_so; }
 
 }  // namespace alidade

@@ -34,19 +34,19 @@ struct CaptureConfig {
   CalibrateConfig calibrate = {};
 };
 
-/// "0.2px" or "0.2".
+/// The field of `config` that a user sets: until_px, "0.2px" or "0.2".
 [[nodiscard]] FieldList fields_of(CaptureConfig& config);
 
-/// What an image shows, and what it would bring.
+/// What an image shows, and whether it is worth keeping.
 enum class LookStatus {
   nothing,      ///< No board.
   other_board,  ///< A chessboard of another size than was given.
   moving,       ///< The board has not stood still yet.
-  blurred,      ///< Of the sharpest so far.
+  blurred,      ///< Blurred, compared with the sharpest so far.
   same_pose,    ///< As in a photo that is kept already: its errors would be the same.
-  little,       ///< It would bring next to nothing, or much less than the pose that is asked for.
+  little,       ///< It would lower σ by next to nothing, or by much less than the proposed pose.
   repeated,     ///< The same image as before, to the bit.
-  useful,       ///< To be taken.
+  useful,       ///< Worth keeping.
 };
 
 /// The word for it: "nothing", "other_board" …
@@ -54,7 +54,7 @@ enum class LookStatus {
 
 /// An image that was shown before.
 struct EarlierImage {
-  std::shared_ptr<const cv::Mat> image;  ///< Null where corners alone came.
+  std::shared_ptr<const cv::Mat> image;  ///< Null where corners alone were given.
   BoardView view;
   double t_s = 0.0;
 };
@@ -63,10 +63,10 @@ struct EarlierImage {
 struct CaptureLook {
   LookStatus status = LookStatus::nothing;
   std::string words;                        ///< To the person, one line: what is wrong, or how to move the board.
-  std::string words_mirrored;               ///< The same to who sees the image mirrored.
+  std::string words_mirrored;               ///< The same for a person who sees the image mirrored.
   std::vector<Eigen::Vector2d> corners_px;  ///< As seen; empty where there is no board.
   int other_cols = 0, other_rows = 0;       ///< Of other_board.
-  double gain = 0.0;                        ///< ln of σ now over σ with it, over the image; 0: not known or none.
+  double gain = 0.0;                        ///< ln(σ now / σ with it), over the image; 0: unknown or none.
   std::optional<EarlierImage> earlier;      ///< To be taken instead of this one: it is more informative.
   [[nodiscard]] bool take() const { return status == LookStatus::useful; }
 };
@@ -93,39 +93,39 @@ struct CaptureState {
   [[nodiscard]] bool is_at(double goal_px) const { return has_camera && worst_3sigma_px <= goal_px; }
 };
 
-/// Decides about images while they come, solves after each that is kept, and says where to hold the board next: the
-/// pose that lowers σ over the image most, by the information matrix of the lens. Knows no files and no clock: times
-/// come with the images. One thread at a time.
+/// Judges images one by one, solves after each that is kept, and proposes where to hold the board next: the pose that
+/// lowers σ over the image most, by the information matrix of the lens. Uses no files and no clock: times are given
+/// with the images. One thread at a time.
 /// Richardson, Strom & Olson, "AprilCal", IROS 2013 (the idea); Fedorov 1972 (sequential design), see next_photo.h.
 class CaptureGuide {
  public:
-  /// Throws ConfigError for a config or a board that cannot be.
+  /// Throws ConfigError for an invalid config or board.
   explicit CaptureGuide(const Board& board, const CaptureConfig& config = {});
   ~CaptureGuide();
   CaptureGuide(CaptureGuide&&) noexcept;
   CaptureGuide& operator=(CaptureGuide&&) noexcept;
 
-  /// Looks at an image (8- or 16-bit, grey or colour) of time `t_s`, which does not go back. All have the size of the
-  /// first; of another size: LookStatus::nothing.
+  /// Judges an image (8- or 16-bit, grey or colour) of time `t_s`, which must not decrease. All have the size of the
+  /// first; an image of another size is LookStatus::nothing.
   [[nodiscard]] CaptureLook look(const cv::Mat& image, double t_s);
-  /// Nothing new comes: what of the images that were shown is to be taken at that time, as `earlier`; else not
-  /// useful.
+  /// For times without new images: the best of the images shown so far, as `earlier`, if it is worth keeping at that
+  /// time; else not useful.
   [[nodiscard]] CaptureLook look_back(double t_s);
-  /// Keeps an image, whatever it brings, and solves. Why it cannot be kept (no board in it), else "".
+  /// Keeps an image, however little it helps, and solves. Returns why it cannot be kept (no board in it), else "".
   [[nodiscard]] std::string take(const cv::Mat& image);
-  /// look(), and take() where that is to be done; `status` is then `useful`.
+  /// look(), and take() if the image is useful.
   CaptureLook push(const cv::Mat& image, double t_s);
-  /// The same with corners that were found elsewhere, in images of that size.
+  /// The same with corners detected by other means, in images of that size.
   CaptureLook push(const BoardView& view, const ImageSize& size, double t_s);
   /// Forgets a photo that was kept, by its number among them.
   void forget(std::size_t photo);
 
   [[nodiscard]] const CaptureState& state() const;
-  /// What the whole job, with the board's shape and its second look at the corners, found for these photos: from here
-  /// on σ is stated in proportion.
+  /// The σ that calibrate(), which also estimates the board's shape and extracts the corners twice, found for these
+  /// photos: from now on σ is scaled to it.
   void correct(double worst_3sigma_px);
-  /// From now on whatever still brings something is useful: where no better image will come.
-  void take_what_comes(bool is_so);
+  /// Whether an image is useful as soon as it lowers σ at all: for sources from which no better image will come.
+  void accept_any_useful(bool accept);
 
  private:
   struct State;
@@ -149,10 +149,10 @@ struct ShotGuideState {
 /// as much as a beam needs.
 class ShotGuide {
  public:
-  /// Throws ConfigError for a config or a camera that cannot be.
+  /// Throws ConfigError for an invalid config or camera.
   explicit ShotGuide(Camera camera, RangefinderConfig config = {}, ShotConfig where = {});
 
-  /// Takes a shot and solves. Throws ConfigError for numbers that no shot can have; it is then not taken.
+  /// Adds a shot and solves. Throws ConfigError for an invalid shot, which is then not added.
   const ShotGuideState& push(const Shot& shot);
   void undo();
   [[nodiscard]] const ShotGuideState& state() const { return state_; }
@@ -172,7 +172,7 @@ struct ViewGuideState {
   int views = 0;
   bool has_rig = false;
   Rig rig;  ///< With its covariance, where there is one.
-  /// How well it is known where the cameras stand to each other over the angles of the config; infinite: not yet.
+  /// σ of the cameras' relative pose, the worst over the angles of the config; infinite: not known yet.
   RigSigma sigma = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   Verdict verdict;                               ///< On the views so far.
   std::optional<NextView> next;                  ///< Before there is a rig, the words alone say it.
@@ -184,10 +184,10 @@ struct ViewGuideState {
 /// next view is that of plan_view(). Before there is a rig, views that differ as much as its axes need.
 class ViewGuide {
  public:
-  /// `cameras`: by id of the head. Throws ConfigError for cameras or a config that cannot be; it names a board.
+  /// `cameras`: by id of the head. `config.board` must be given. Throws ConfigError for invalid cameras or config.
   explicit ViewGuide(std::map<int, Camera> cameras, RigConfig config, ViewConfig where = {});
 
-  /// Takes a view and solves. Throws ConfigError for a view that no head can have; it is then not taken.
+  /// Adds a view and solves. Throws ConfigError for an invalid view, which is then not added.
   const ViewGuideState& push(const HeadView& view);
   void undo();
   [[nodiscard]] const ViewGuideState& state() const { return state_; }

@@ -15,8 +15,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// From observations of numbered points, frames in order of time. Throws ConfigError for a config, a camera or frames
-/// that cannot be, Interrupted where `progress` says stop; never for what the observations show. With `truth` the
+/// From observations of numbered points, frames in order of time. Throws ConfigError for an invalid config,
+/// camera or frame, Interrupted where `progress` returns false; never for what the observations show. With `truth` the
 /// result has the path's error.
 [[nodiscard]] Localization localize(const ObservationTable& observations, const Camera& camera,
                                     const LocalizeConfig& config = {}, std::span<const TimedPose> truth = {},
@@ -25,12 +25,12 @@ ALIDADE_PUBLIC_BEGIN
                                     const LocalizeConfig& config = {}, std::span<const TimedPose> truth = {},
                                     const Progress& progress = {});
 
-/// From images, 8-bit grey and of the camera's size, in order of time: features are chosen and found again in them.
+/// From images, 8-bit grey and of the camera's size, in order of time: features are selected and tracked in them.
 [[nodiscard]] Localization localize(const ImageStream& images, const Camera& camera, const LocalizeConfig& config = {},
                                     std::span<const TimedPose> truth = {}, const Progress& progress = {});
 
-/// The same frame by frame, as they come. What push() gives is the filter's; finish() gives what localize() gives from
-/// the same frames, to the last digit.
+/// The same, incrementally, frame by frame. push() returns the filter's pose; finish() returns what localize() returns
+/// for the same frames, to the last digit.
 class Localizer {
  public:
   /// Throws ConfigError.
@@ -39,7 +39,7 @@ class Localizer {
   Localizer(Localizer&&) noexcept;
   Localizer& operator=(Localizer&&) noexcept;
 
-  /// The next frame: observations or images, but not both. Throws ConfigError, and is then as it was before.
+  /// The next frame: observations or images, but not both. If it throws ConfigError, the state is unchanged.
   const PathStep& push(const ObservationFrame& frame);
   const PathStep& push(const cv::Mat& grey, long frame, double t_s);
   /// The result so far; more may follow.

@@ -63,7 +63,7 @@ NetworkCalibration network(std::vector<TargetObservation> observations, const st
   return result;
 }
 
-Rig placed_rig(const MovingTargetReport& report) {
+Rig located_rig(const MovingTargetReport& report) {
   Rig rig;
   std::vector<Eigen::Index> from;
   for (std::size_t h = 0; h < report.cameras.size(); ++h) {
@@ -79,7 +79,7 @@ Rig placed_rig(const MovingTargetReport& report) {
 std::vector<TargetObservation> observations_on_one_clock(const NetworkCalibration& calibration) {
   std::vector<TargetObservation> on_rig;
   for (const TargetObservation& observation : calibration.observations) {
-    const PlacedCamera& camera = calibration.cameras[observation.head];
+    const LocatedCamera& camera = calibration.cameras[observation.head];
     if (!camera.placed) continue;
     on_rig.push_back(observation);
     on_rig.back().t_capture_s = on_rig.back().t_arrival_s = camera.clock.in_rig(observation.t_capture_s);

@@ -14,14 +14,14 @@ namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// Positions, attitudes and clocks of the cameras of `heads` (heads_with()), from their observations of the target.
-/// `truth`: the target's path by other means; empty: none. Throws ConfigError for a config, heads or observations that
-/// cannot be, Interrupted where `progress` says stop; never for what the observations show.
+/// `truth`: the target's path by other means; empty: none. Throws ConfigError for an invalid config, heads or
+/// observations, Interrupted where `progress` returns false; never for what the observations show.
 [[nodiscard]] NetworkCalibration network(std::vector<TargetObservation> observations, const std::vector<RigHead>& heads,
                                          const MovingTargetConfig& config, const TrueTrack& truth = {},
                                          const Progress& progress = {});
 
 /// The located heads alone, with their part of the covariance.
-[[nodiscard]] Rig placed_rig(const MovingTargetReport& report);
+[[nodiscard]] Rig located_rig(const MovingTargetReport& report);
 
 /// The observations of the located cameras on the rig's one clock, in order of time: what `alidade track` reads.
 [[nodiscard]] std::vector<TargetObservation> observations_on_one_clock(const NetworkCalibration& calibration);

@@ -12,20 +12,20 @@
 #include "alidade/public.h"
 
 /// Intrinsics of a camera that rotates (and zooms), from what it sees meanwhile: the whole job, as `alidade observe`
-/// does it. Rows that come one by one: Observer. Where to rotate next: plan_moves().
+/// does it. Incremental, row by row: Observer. Where to rotate next: plan_moves().
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// From a log of its rotation and of points that stand still. Throws ConfigError for a config or a log that cannot be,
-/// Interrupted where `progress` says stop; never for what the log shows. docs/maths/rotating-camera.md.
+/// From a log of its rotation and of static points. Throws ConfigError for an invalid config or log, Interrupted where
+/// `progress` returns false; never for what the log shows. docs/maths/rotating-camera.md.
 [[nodiscard]] ObserveReport observe(RotationLog log, const ObserveConfig& config = {}, const Progress& progress = {});
 
-/// From photos that it took while it was rotated on the spot, by hand say. Of the config method, lever, σ of angles,
-/// rates and ranges, and window are of logs; `estimate` is auto, none, k1 or k2. docs/maths/turned-photos.md.
+/// From photos taken while it was rotated about its centre, by hand for example. Of the config method, lever, σ of
+/// angles, rates and ranges, and window do not apply; `estimate` is auto, none, k1 or k2. docs/maths/turned-photos.md.
 [[nodiscard]] ObserveReport observe(const Photos& photos, const ObserveConfig& config = {},
                                     const Progress& progress = {});
 
-/// From matches between such photos that somebody found, of which many may be wrong.
+/// From given matches between such photos, of which many may be wrong.
 [[nodiscard]] ObserveReport observe(MatchedPhotos matches, const ObserveConfig& config = {},
                                     const Progress& progress = {});
 

@@ -238,7 +238,7 @@ RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, c
                           const std::optional<Eigen::Vector3d>& point_in_world) {
   if (const std::string of_rig = fault(rig); !of_rig.empty()) throw ConfigError(of_rig);
   if (rig.heads.empty()) throw ConfigError("the rig has no heads");
-  if (!rig.lens_courses.empty())
+  if (!rig.intrinsics_histories.empty())
     throw ConfigError("intrinsics: change with time, which `project` is not given; give a camera");
   check_angles(pans_rad, "--pan", rig.heads.size());
   check_angles(tilts_rad, "--tilt", rig.heads.size());

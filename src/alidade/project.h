@@ -47,7 +47,7 @@ struct BeamProjection {
 };
 
 /// Where a rangefinder's readings [m] are, in its camera and in the image. Throws ConfigError for no readings, and for
-/// a beam, a camera or numbers that cannot be.
+/// an invalid beam, camera or number.
 [[nodiscard]] BeamProjection project_readings(const Beam& beam, const Camera& camera,
                                               const std::vector<double>& ranges_m, const ProjectConfig& config = {});
 
@@ -73,8 +73,8 @@ struct RigProjection {
   Verdict verdict;
 };
 
-/// `pans_rad`, `tilts_rad`: what the encoders read, one for all heads or one for each. Throws ConfigError for angles
-/// that are not as many or more than a turn, and for a rig that cannot be, or whose intrinsics change with time.
+/// `pans_rad`, `tilts_rad`: what the encoders read, one for all heads or one for each. Throws ConfigError for a
+/// wrong number of angles or more than a revolution, and for an invalid rig, or one whose intrinsics change with time.
 [[nodiscard]] RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad,
                                         const std::vector<double>& tilts_rad,
                                         const std::optional<Eigen::Vector3d>& point_in_world = {});

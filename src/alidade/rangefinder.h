@@ -16,11 +16,11 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Of readings and what was seen of each: the laser's spot, corners of a board, its pose or its plane. With
+/// From readings and what was observed of each: the laser's spot, corners of a board, its pose or its plane. With
 /// `load_photo` boards and spots are found in the photos that the shots name; a shot whose photo cannot be used is
 /// named in `unreadable` and `counts.skipped`. The scale of the readings is estimated too where the beam needs it and
-/// the shots determine it. Throws ConfigError for a config or a camera that cannot be, Interrupted where `progress`
-/// says stop; never for what the shots show.
+/// the shots determine it. Throws ConfigError for an invalid config or camera, Interrupted where `progress` returns
+/// false; never for what the shots show.
 [[nodiscard]] RangefinderCalibration rangefinder(std::vector<Shot> shots, const Camera& camera,
                                                  const RangefinderConfig& config = {},
                                                  const PhotoByName& load_photo = {}, const Progress& progress = {});

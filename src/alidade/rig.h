@@ -11,14 +11,14 @@
 #include "alidade/rig/calibration.h"
 
 /// Calibration of pan-tilt heads: the whole job, as `alidade rig` does it. Its result has the axes, offsets and
-/// mountings with their covariance, where the heads stand to each other, what was rejected and why, and a verdict.
+/// mountings with their covariance, the heads' relative poses, what was rejected and why, and a verdict.
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// From views of static boards, each with what the head's encoders read. `cameras`: by id of the head
 /// (cameras_by_head()). With `load_photo` the boards are found in the photos that the views name; a photo without one
-/// is named in `counts.skipped`. Throws ConfigError for a config or cameras that cannot be, and for corners outside
-/// their camera's image; Interrupted where `progress` says stop; never for what the views show.
+/// is named in `counts.skipped`. Throws ConfigError for an invalid config or cameras, and for corners outside their
+/// camera's image; Interrupted where `progress` returns false; never for what the views show.
 [[nodiscard]] RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cameras,
                                  const RigConfig& config, const PhotoByName& load_photo = {},
                                  const Progress& progress = {});

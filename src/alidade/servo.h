@@ -12,8 +12,9 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Every controller of the scenario over the same seeds, from `first_seed` on. `watch` is shown the rows of each
-/// controller's first trial. Throws ConfigError for a scenario that cannot be, Interrupted where `progress` says stop.
+/// Every controller of the scenario over the same seeds, from `first_seed` on. `watch` is called with the rows of
+/// each controller's first trial. Throws ConfigError for an invalid scenario, Interrupted where `progress` returns
+/// false.
 [[nodiscard]] ServoResult servo(const ServoScenario& scenario = {}, std::uint64_t first_seed = 1,
                                 const Progress& progress = {}, const ServoWatch& watch = {});
 

@@ -104,9 +104,9 @@ FollowConfig follow_config(const TrackConfig& config, const Rig& rig) {
 }
 
 /// What is assumed of a lens that zooms is not the rig's one number.
-void name_courses(const Rig& rig, std::vector<Assumption>& assumed) {
-  for (std::size_t h = 0; h < rig.lens_courses.size(); ++h) {
-    if (rig.lens_courses[h].lens.empty()) continue;
+void name_intrinsics_histories(const Rig& rig, std::vector<Assumption>& assumed) {
+  for (std::size_t h = 0; h < rig.intrinsics_histories.size(); ++h) {
+    if (rig.intrinsics_histories[h].lens.empty()) continue;
     const std::string of_camera = fmt::format("head{}.camera.", rig.heads[h].head.id);
     for (Assumption& one : assumed) {
       if (!one.name.starts_with(of_camera)) continue;
@@ -141,21 +141,21 @@ void judge_track(const FollowConfig& follow, TargetTrack& result) {
                                  {.sigma_px = config.sigma_px.has_value(),
                                   .sigma_a = config.sigma_a_m_s2.has_value(),
                                   .sigma_clock_s = config.sigma_clock_s.value_or(0.0)});
-  name_courses(result.rig, result.assumed);
+  name_intrinsics_histories(result.rig, result.assumed);
   heed_assumptions(result.assumed, result.verdict);
 }
 
 }  // namespace
 
-std::string lens_course_fault(const std::vector<TargetObservation>& observations, const Rig& rig) {
+std::string intrinsics_history_fault(const std::vector<TargetObservation>& observations, const Rig& rig) {
   constexpr double beyond_s = 1.0;  // how long an observer's last estimate is extrapolated
-  const auto outside = outside_course(observations, rig.lens_courses, beyond_s);
+  const auto outside = outside_history(observations, rig.intrinsics_histories, beyond_s);
   if (!outside) return "";
-  const LensCourse& course = rig.lens_courses[outside->head];
+  const IntrinsicsHistory& history = rig.intrinsics_histories[outside->head];
   return fmt::format(
       "{}: gives head {}'s intrinsics from {:.6g} to {:.6g} s, but there is an observation at {:.6g} s; "
       "are the clocks the same?",
-      course.name, rig.heads[outside->head].head.id, course.from_s, course.until_s, outside->t_s);
+      history.name, rig.heads[outside->head].head.id, history.from_s, history.until_s, outside->t_s);
 }
 
 TargetTrack track(std::vector<TargetObservation> observations, Rig rig, const TrackConfig& config, TrueTrack truth,
@@ -168,10 +168,10 @@ TargetTrack track(std::vector<TargetObservation> observations, Rig rig, const Tr
     const std::string fault = observation_fault(observations[i], rig.heads.size());
     if (!fault.empty()) throw ConfigError(fmt::format("observation {}: {}", i, fault));
   }
-  if (const std::string fault = lens_course_fault(observations, rig); !fault.empty()) throw ConfigError(fault);
+  if (const std::string fault = intrinsics_history_fault(observations, rig); !fault.empty()) throw ConfigError(fault);
   TargetTrack result;
   result.counts.given = observations.size();
-  if (!rig.lens_courses.empty()) use_courses(rig.lens_courses, observations, rig);
+  if (!rig.intrinsics_histories.empty()) use_intrinsics_histories(rig.intrinsics_histories, observations, rig);
   result.observations = std::move(observations);
   result.rig = std::move(rig);
   result.truth = std::move(truth);
@@ -210,8 +210,8 @@ std::variant<Tracker, XiahouTracker> tracker_for(const Rig& rig, const TrackConf
   require_sense(config);
   require_sense(rig);
   require_paper(config, rig);
-  if (!rig.lens_courses.empty())
-    throw ConfigError("courses of intrinsics are of recordings: give each observation its lens");
+  if (!rig.intrinsics_histories.empty())
+    throw ConfigError("intrinsics over time are for recordings: give each observation its lens");
   if (config.method == TrackMethod::xiahou2015) return XiahouTracker(rig.heads, xiahou_config(config, rig.heads));
   return Tracker(rig.heads, with_history(follow_config(config, rig)));
 }

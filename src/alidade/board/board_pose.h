@@ -27,7 +27,7 @@ struct CornerResiduals {
   Eigen::MatrixXd J_lens;  ///< As many columns as the lens has parameters.
 };
 
-/// None where the lens does not see a corner, or a corner has a number that the board has not. `sigma_px`: replaces
+/// None where a corner is outside the lens' domain, or has an index that the board does not have. `sigma_px`: replaces
 /// the corners' covariances.
 [[nodiscard]] std::optional<CornerResiduals> corner_residuals(const Camera& camera, const Rigid3& cam_from_board,
                                                               const BoardView& view,
@@ -38,13 +38,13 @@ struct BoardPoseFit {
   BoardPose pose;
   double chi2 = 0.0;  ///< Sum of the squared whitened residuals.
   int dof = 0;
-  /// How the pose follows the lens: ∂ξ/∂(lens parameters), 6 × their number.
+  /// Sensitivity of the pose to the lens: ∂ξ/∂(lens parameters), 6 × their number.
   Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_lens;
 };
 
 /// Pose of a flat (or nearly flat) board of at least four corners in front of a known camera, by maximum likelihood
-/// from a homography of the corners' rays; of the two poses that a distant board nearly has, the better one. None where
-/// there is none: too few corners, all on a line, numbers that the board has not, or no convergence.
+/// from a homography of the corners' rays; of the two poses that a distant board nearly has, the better one. None for
+/// too few corners, collinear corners, indices that the board does not have, or no convergence.
 [[nodiscard]] std::optional<BoardPoseFit> fit_board_pose(const Camera& camera, const BoardView& view,
                                                          std::span<const Eigen::Vector3d> points_in_board,
                                                          std::optional<double> sigma_px = {});

@@ -45,7 +45,7 @@ struct CalibrateReport {
   /// Lens, size, rms_px, and the covariance over all lens parameters: cluster-robust, as a photo's corners share
   /// errors.
   Camera camera;
-  Eigen::MatrixXd model_cov;            ///< The same as if every corner erred by itself.
+  Eigen::MatrixXd model_cov;            ///< The same if all corner errors were independent.
   ClusterCovariance clusters;           ///< Why the two differ; its clusters are the views in use, in order.
   std::vector<OtherLens> other_lenses;  ///< Where the views determine the centre poorly; `camera.cov` extends to them.
   std::vector<ViewFit> views;
@@ -61,14 +61,14 @@ struct CalibrateReport {
   int iterations = 0;
 };
 
-/// Whether outliers are looked for among corners that have covariances, or have none.
+/// Whether outliers are searched for, by whether the corners have covariances.
 [[nodiscard]] bool rejects_outliers(const CalibrateConfig& config, bool have_covariances);
 
-/// Noise [px] of a corner that, all independent, would inform as little as corners that share errors do: what one more
-/// photo is worth.
+/// Effective noise [px] of a corner: independent corners of this σ would give as much information as the actual ones,
+/// which share errors. For planning photos.
 [[nodiscard]] double shared_noise_px(const CalibrateReport& report);
 
-/// Image size [px]; the start of the principal point where the views alone cannot give one, and the σ map's range.
+/// Image size [px]: the initial guess of the principal point where the views do not give one, and the σ map's range.
 struct ImageSize {
   int width_px = 0;
   int height_px = 0;

@@ -15,18 +15,18 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Everything a calibration has to say: what the solve found (camera, views, board_points …), and what it is worth.
+/// The result of calibrate(): what the solve found (camera, views, board_points …), its study and its verdict.
 /// `study` and `next` are empty where there is no camera.
 struct Calibration : CalibrateReport {
   Board board;
   std::vector<BoardView> board_views;  ///< The corners, one entry per photo; `views` says what became of each.
-  ImageSize size;                      ///< That most photos have; 0x0 where none could be read.
+  ImageSize size;                      ///< Of most photos; 0x0 where none could be read.
   std::size_t num_unreadable = 0;      ///< Photos that could not be read.
-  CalibrateConfig config;              ///< As used: a shape that does not transfer is not used.
+  CalibrateConfig config;              ///< As used: without a board shape that failed its transfer test.
   BoardShape asked_shape = BoardShape::automatic;
   CalibrationStudy study;
   NextPhotoPlan next;
-  std::optional<PortResidual> port;  ///< Of a flat_port: whether a brown lens would do.
+  std::optional<PortResidual> port;  ///< Of a flat_port: whether a brown lens would suffice.
   std::vector<Assumption> assumed;
   Counts counts;  ///< Of photos.
   Verdict verdict;

@@ -22,7 +22,7 @@ enum class BoardShape { flat, bow, free, given, automatic };
 struct Prior {
   std::string name;  ///< Parameter name of the lens model: fx, cx, k3, …
   double value = 0.0;
-  double sigma = 1.0;  ///< Infinite: a start, no knowledge.
+  double sigma = 1.0;  ///< Infinite: an initial guess only.
 
   bool operator==(const Prior&) const = default;
 };
@@ -35,7 +35,7 @@ enum class OutlierRule { automatic, drop, keep };
 struct PortKnowledge {
   std::optional<Camera>
       air;              ///< The lens as calibrated in air (pinhole or brown), fixed. None: it is estimated as well.
-  double gap_m = 0.02;  ///< A start.
+  double gap_m = 0.02;  ///< Initial guess.
   std::optional<double> glass_m;         ///< Fixed; must be given.
   double n_glass = 1.5, n_water = 1.34;  ///< Fixed: the photos hardly separate them from the gap.
 };

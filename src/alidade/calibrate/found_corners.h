@@ -7,8 +7,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The corners of a board in photos, each with the covariance to be stated: its own, and, where a calibration of the
-/// photos settles, what that finds in the residuals beyond the corners' own.
+/// The corners of a board in photos, each with its total covariance: that of its fit and, where a calibration of the
+/// photos converges, the excess that its residuals show.
 struct FoundCorners {
   std::vector<BoardView> board_views;  ///< One per photo; without the rejected ones.
   ImageSize size;

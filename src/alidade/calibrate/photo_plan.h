@@ -16,7 +16,7 @@ struct CalibratedNow {
   Board board;
   std::vector<Eigen::Vector3d> board_points;  ///< [m] as solved.
   double noise_px = 0.0;                      ///< Of a corner.
-  double design_effect = 1.0;                 ///< Variance over that of corners that err independently.
+  double design_effect = 1.0;                 ///< Variance over that of independent corner errors.
 };
 
 struct PhotoConfig {
@@ -32,12 +32,12 @@ struct PhotoPlan : NextPhotoPlan {
   Verdict verdict;
 };
 
-/// The board poses whose photos lower the uncertainty most, one after the other. Throws ConfigError for a config or a
-/// camera that cannot be.
+/// The board poses whose photos lower the uncertainty most, one after the other. Throws ConfigError for an invalid
+/// config or camera.
 [[nodiscard]] PhotoPlan plan_photos(const CalibratedNow& now, const PhotoConfig& config = {},
                                     const Progress& progress = {});
 
-/// What a calibration knows of its camera. Throws ConfigError where it has none.
+/// The inputs of plan_photos() from a calibration. Throws ConfigError where it has no camera.
 [[nodiscard]] CalibratedNow calibrated_now(const Calibration& calibration);
 
 ALIDADE_PUBLIC_END

@@ -223,7 +223,7 @@ TEST(Guide, NamesAFocalLengthThatWalks) {
   Person person(camera, 2);
   for (const double walk : {0.0, 0.01}) {
     CaptureGuide guide(test_board, {.until_px = 0.01, .is_video = false});
-    guide.take_what_comes(true);
+    guide.accept_any_useful(true);
     const BoardScene scene = draw_board_scene(camera, test_board, {.num_photos = 12}, 5);
     for (std::size_t i = 0; i < 12; ++i) {
       Camera focused = camera;

@@ -8,8 +8,8 @@
 
 namespace alidade {
 
-/// What a few photos determine of a camera: a solve where they determine one; else a guess, with what is known of any
-/// camera and what these photos add to it, so that the next pose can be chosen from the first photo on.
+/// The camera from a few photos: a solve where they determine one; else a guess with a weak prior and the information
+/// of these photos, so that the next pose can be chosen from the first photo on.
 struct LensSoFar {
   Camera camera;  ///< With its covariance.
   bool is_solved = false;
@@ -22,8 +22,8 @@ struct LensSoFar {
 [[nodiscard]] LensSoFar lens_so_far(const Board& board, const std::vector<BoardView>& views, const ImageSize& size,
                                     const CalibrateConfig& config);
 
-/// "the focal length varies between photos, …" where each photo by itself asks for another one than its neighbours, far
-/// beyond its σ: a camera that focuses by itself. Empty where none does.
+/// "the focal length varies between photos, …" where the focal lengths of single photos differ from those of their
+/// neighbours, far beyond their σ: a camera that focuses by itself. Empty where none does.
 [[nodiscard]] std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& views);
 
 }  // namespace alidade

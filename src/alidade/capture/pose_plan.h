@@ -14,7 +14,7 @@ namespace alidade {
 /// Whether two views show a board held alike: the corners that both have lie apart by less than `share` of the board.
 [[nodiscard]] bool is_same_pose(const BoardView& a, const BoardView& b, double share);
 
-/// What photos that might be taken would bring to a camera that has its covariance.
+/// The information that possible photos would add to a camera with a covariance.
 class PosePlan {
  public:
   /// `noise_px`: of a corner, such that photos are worth what they are (shared_noise_px).

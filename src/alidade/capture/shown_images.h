@@ -20,8 +20,8 @@ struct ShownImage {
   double gain = 0.0;  ///< As valued last.
 };
 
-/// The most informative of the images that were shown, each pose once: who is not led by the outline shows good poses
-/// and goes on, and which were good is known only afterwards.
+/// The most informative of the images shown, one per pose: a user who ignores the outline passes good poses, and which
+/// were good is known only afterwards.
 class ShownImages {
  public:
   /// Keeps a copy of the image, if no other like it is kept and few enough that are more informative.

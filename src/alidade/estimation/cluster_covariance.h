@@ -16,7 +16,7 @@ ALIDADE_PUBLIC_BEGIN
 /// clusters' own eliminated), A and g = Σ Jᵀr the cluster's part of it and of the gradient at the optimum, r whitened.
 struct ClusterStep {
   Eigen::VectorXd step;    ///< H⁻¹ g, of the requested parameters.
-  Eigen::MatrixXd spread;  ///< H⁻¹ A H⁻¹, of the same: what `step` would have for covariance were the truth fitted.
+  Eigen::MatrixXd spread;  ///< H⁻¹ A H⁻¹, of the same: the covariance of `step` at the true parameters.
   /// H⁻¹ A H⁻¹ A H⁻¹, of the same, over all shared parameters: by how much the fit to the cluster itself lessens that.
   /// May be omitted where all shared parameters are requested.
   Eigen::MatrixXd taken = {};

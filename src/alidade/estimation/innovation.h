@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What was expected of a measurement before it was used: innovation ν = z − h(x) and its covariance S.
+/// Innovation ν = z − h(x) of a measurement, before it was used, and its covariance S.
 struct Innovation {
   Eigen::Vector2d nu = Eigen::Vector2d::Zero();
   Eigen::Matrix2d S = Eigen::Matrix2d::Identity();

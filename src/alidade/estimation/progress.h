@@ -14,11 +14,11 @@ ALIDADE_PUBLIC_BEGIN
 /// The user pressed Ctrl-C; the command line turns it into one line and its exit code, nothing is written.
 struct Interrupted : std::runtime_error {
   Interrupted() : std::runtime_error("interrupted; nothing written") {}
-  /// Of work that leaves what it has done.
+  /// For work that keeps what it has done.
   explicit Interrupted(const std::string& what) : std::runtime_error(what) {}
 };
 
-/// How long work reports itself and is stopped: called now and then, from any thread, as (what, done, total).
+/// How long-running work reports progress and is stopped: called now and then, from any thread, as (what, done, total).
 /// Returns false to stop; the work then throws Interrupted. An empty Progress never stops and shows nothing.
 using Progress = std::function<bool(std::string_view what, std::size_t done, std::size_t total)>;
 

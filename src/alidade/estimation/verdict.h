@@ -48,7 +48,7 @@ struct Assumption {
   std::string remedy = {};      ///< What a user can do to have it included: "give --sigma-square".
 };
 
-/// What an estimator says of its own answer: a state, one sentence, what to add, and the checks behind it.
+/// The assessment of an estimate by its estimator: a state, one sentence, what to add, and the checks behind it.
 struct Verdict {
   State state = State::good;
   ExitCode exit_code = ExitCode::ok;
@@ -64,7 +64,7 @@ struct Verdict {
 /// nothing assumed it is good.
 [[nodiscard]] Check assumed_check(const std::vector<Assumption>& assumed);
 
-/// Joins the check to the verdict. A good verdict that it does not bear out becomes one of care, and says what to do.
+/// Adds the check to the verdict. A good verdict becomes State::care if the check is not good, and says what to do.
 void heed(const Check& check, const std::string& remedy, Verdict& verdict);
 
 /// Both of the above.

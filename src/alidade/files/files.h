@@ -10,7 +10,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The outside world is wrong: one line, "file:line: column: what; what to do". Becomes exit code 3.
+/// Wrong input: one line, "file:line: column: what; what to do". Becomes exit code 3.
 struct InputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -19,20 +19,20 @@ ALIDADE_PUBLIC_BEGIN
 enum class CameraFormat { alidade, opencv, ros, kalibr, mrcal, colmap };
 
 /// Reads a camera file of any known format, recognised by its content. Of a file with several cameras one is chosen by
-/// its name in the file: "camchain.yaml:cam1". Throws InputError, also for a lens that no model of ours can be.
+/// its name in the file: "camchain.yaml:cam1". Throws InputError, also for a lens model that is not supported.
 [[nodiscard]] Camera read_camera(const std::filesystem::path& file);
 
 /// The same where all rays must meet in one point: throws InputError for a flat_port camera.
 [[nodiscard]] Camera read_central_camera(const std::filesystem::path& file);
-/// Throws that InputError for a camera at hand; `name` begins the message.
+/// Throws that InputError for a given camera; `name` begins the message.
 void require_central(const Camera& camera, const std::string& name);
 
-/// read_camera() of text that is at hand; `name` stands for the file in messages, `choice` is the camera's name in the
+/// read_camera() of a given text; `name` stands for the file in messages, `choice` is the camera's name in the
 /// file (empty: the only one).
 [[nodiscard]] Camera parse_camera(std::string_view text, const std::string& name, const std::string& choice = "");
 
-/// What a camera file says beside the camera, which read_camera() passes over and no camera_text() will say again:
-/// where it stands among others (T_cn_cnm1 of Kalibr, extrinsics of mrcal), its position in a stereo pair (R and P of
+/// What a camera file holds beside the camera, which read_camera() ignores and camera_text() does not write again:
+/// its pose relative to others (T_cn_cnm1 of Kalibr, extrinsics of mrcal), its position in a stereo pair (R and P of
 /// ROS), which of several it is. In words, empty for most files. Reads and throws as read_camera() does.
 [[nodiscard]] std::vector<std::string> unread_parts(const std::filesystem::path& file);
 

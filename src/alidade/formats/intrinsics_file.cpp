@@ -41,10 +41,10 @@ std::string intrinsics_csv(std::span<const double> t_s, std::span<const Intrinsi
 namespace {
 
 /// The estimate of a row that has one.
-LensNow lens_of_row(const Csv& csv, std::size_t row) {
+IntrinsicsSample lens_of_row(const Csv& csv, std::size_t row) {
   constexpr std::array<const char*, 4> values{"fx", "fy", "cx", "cy"},
       sigmas{"sigma_fx", "sigma_fy", "sigma_cx", "sigma_cy"};
-  LensNow now;
+  IntrinsicsSample now;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     now.k[k] = i < 2 ? csv.positive(row, values[i]) : csv.number(row, values[i]);
@@ -59,23 +59,23 @@ LensNow lens_of_row(const Csv& csv, std::size_t row) {
 
 }  // namespace
 
-LensCourse read_lens_course(const std::filesystem::path& file) {
+IntrinsicsHistory read_intrinsics_history(const std::filesystem::path& file) {
   const Csv csv = Csv::read(file);
   csv.require(std::vector<std::string>{"t_s", "fx", "fy", "cx", "cy", "sigma_fx", "sigma_fy", "sigma_cx", "sigma_cy"});
-  LensCourse course;
-  course.name = file.string();
+  IntrinsicsHistory history;
+  history.name = file.string();
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
     const double t_s = csv.number(row, "t_s");
-    if (row > 0 && !(t_s > course.until_s))
+    if (row > 0 && !(t_s > history.until_s))
       throw InputError(csv.where(row, "t_s") + ": '" + csv.text(row, "t_s") + "' does not come after the row before");
-    if (row == 0) course.from_s = t_s;
-    course.until_s = t_s;
+    if (row == 0) history.from_s = t_s;
+    history.until_s = t_s;
     if (csv.is_empty(row, "fx")) continue;
-    course.t_s.push_back(t_s);
-    course.lens.push_back(lens_of_row(csv, row));
+    history.t_s.push_back(t_s);
+    history.lens.push_back(lens_of_row(csv, row));
   }
-  if (course.lens.empty()) throw InputError(file.string() + ": has no row with an estimate");
-  return course;
+  if (history.lens.empty()) throw InputError(file.string() + ": has no row with an estimate");
+  return history;
 }
 
 }  // namespace alidade

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "alidade/observe/intrinsics_estimate.h"
-#include "alidade/pantilt/lens_course.h"
+#include "alidade/pantilt/intrinsics_history.h"
 
 namespace alidade {
 
@@ -17,6 +17,6 @@ namespace alidade {
 /// Reads such a file: t_s,fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy; other columns may follow, rows without an
 /// estimate are passed over. Throws InputError: a column or all estimates missing, times that do not ascend, a focal
 /// length that is not above zero, an estimate without σ.
-[[nodiscard]] LensCourse read_lens_course(const std::filesystem::path& file);
+[[nodiscard]] IntrinsicsHistory read_intrinsics_history(const std::filesystem::path& file);
 
 }  // namespace alidade

@@ -42,10 +42,10 @@ TEST(IntrinsicsFile, EveryEventHasAWord) {
 
 class LensCourseFile : public ::testing::Test {
  protected:
-  LensCourse read(const std::string& text) {
-    file_ = std::filesystem::path(::testing::TempDir()) / "lens_course.csv";
+  IntrinsicsHistory read(const std::string& text) {
+    file_ = std::filesystem::path(::testing::TempDir()) / "intrinsics_history.csv";
     write_file(file_, text);
-    return read_lens_course(file_);
+    return read_intrinsics_history(file_);
   }
   void expect_refusal(const std::string& text, const std::string& words) {
     try {
@@ -66,14 +66,14 @@ TEST_F(LensCourseFile, IsReadAsItIsWritten) {
   estimates[2] = estimates[1];
   estimates[2].fx = 800;
   const std::vector<double> t_s{0.0, 0.5, 1.0, 1.5};
-  const LensCourse course = read(intrinsics_csv(t_s, estimates));
-  ASSERT_EQ(course.t_s, (std::vector<double>{0.5, 1.0}));
-  EXPECT_EQ(course.from_s, 0.0);
-  EXPECT_EQ(course.until_s, 1.5);
-  EXPECT_NEAR(course.at(0.6).k[0], 720.0, 1e-9);
-  EXPECT_EQ(course.at(0.0).k[0], 700.0);
-  EXPECT_EQ(course.at(9.0).k[0], 800.0);
-  EXPECT_EQ(course.at(0.6).sigma[3], 4.0);
+  const IntrinsicsHistory history = read(intrinsics_csv(t_s, estimates));
+  ASSERT_EQ(history.t_s, (std::vector<double>{0.5, 1.0}));
+  EXPECT_EQ(history.from_s, 0.0);
+  EXPECT_EQ(history.until_s, 1.5);
+  EXPECT_NEAR(history.at(0.6).k[0], 720.0, 1e-9);
+  EXPECT_EQ(history.at(0.0).k[0], 700.0);
+  EXPECT_EQ(history.at(9.0).k[0], 800.0);
+  EXPECT_EQ(history.at(0.6).sigma[3], 4.0);
 }
 
 TEST_F(LensCourseFile, RefusesWhatIsNone) {

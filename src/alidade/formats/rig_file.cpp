@@ -220,11 +220,12 @@ RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem
 }
 
 /// `intrinsics`, a file of them over time, where a head's camera zooms.
-void read_lens_course_of(const YAML::Node& node, std::size_t index, const std::filesystem::path& file, Rig& rig) {
+void read_intrinsics_history_of(const YAML::Node& node, std::size_t index, const std::filesystem::path& file,
+                                Rig& rig) {
   const Fields fields(node, file.string(), fmt::format("heads[{}].", index));
   if (!fields.has("intrinsics")) return;
-  rig.lens_courses.resize(index + 1);
-  rig.lens_courses[index] = read_lens_course(file.parent_path() / fields.text("intrinsics"));
+  rig.intrinsics_histories.resize(index + 1);
+  rig.intrinsics_histories[index] = read_intrinsics_history(file.parent_path() / fields.text("intrinsics"));
 }
 
 /// What a rig's covariance is: of the heads, or of heads and lenses where it names one of these.
@@ -262,7 +263,7 @@ Rig read_rig(const std::filesystem::path& file) {
     const YAML::Node node = heads[i];
     rig.heads.push_back(head_of(node, i, file));
     rig.encoder_errors.push_back(encoder_error_of(node, file.string(), i));
-    read_lens_course_of(node, i, file, rig);
+    read_intrinsics_history_of(node, i, file, rig);
     for (std::size_t k = 0; k < i; ++k) {
       if (rig.heads[k].head.id == rig.heads[i].head.id)
         refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} appears twice", rig.heads[i].head.id));

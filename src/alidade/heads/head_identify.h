@@ -29,7 +29,7 @@ inline constexpr std::array<const char*, 2> head_axis_names{"pan", "tilt"};
 /// The step to whose multiples commands are rounded: where they end, against where they were to end. 0: none is seen.
 [[nodiscard]] double command_step(const PositionerLog& log);
 
-/// What the fits are worth, and what the log did not excite.
+/// The verdict on the fits, and what the log did not excite.
 [[nodiscard]] Verdict head_verdict(const HeadIdentification& identified);
 
 }  // namespace alidade

@@ -21,12 +21,12 @@ class PhotoSet {
   /// Throws InputError where one of the paths does not exist, or is a folder without photos.
   explicit PhotoSet(const std::vector<std::filesystem::path>& paths);
 
-  /// To be worked with: file names, or paths where two files have the same name.
+  /// As input of a job: by file name, or by path where two files have the same name.
   [[nodiscard]] Photos photos() const;
   [[nodiscard]] std::size_t size() const;
   /// Those that were read, in their order: name, size, checksum.
   [[nodiscard]] std::vector<InputFile> inputs() const;
-  /// What lay beside the photos and was none.
+  /// Files beside the photos that are no photos.
   [[nodiscard]] const std::vector<SkippedInput>& skipped() const;
   /// The same in a line for a user; "" for none.
   [[nodiscard]] std::string skipped_line() const;

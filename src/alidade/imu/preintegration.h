@@ -8,10 +8,10 @@
 
 namespace alidade {
 
-/// What an IMU says of the motion between two times, in its axes at the first: rotation, and what the specific force f
-/// alone does to velocity and position, ∫ R f and ∫∫ R f. With position p, velocity v and rotation R of the IMU at the
-/// first time, p⁺ at the second is p + v Δ + ½ g Δ² + R `position`, v⁺ is v + g Δ + R `velocity`. C. Forster et al.,
-/// "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry", TRO 33(1), 2017.
+/// Preintegrated IMU readings between two times, in the IMU's axes at the first: rotation, and the effect of specific
+/// force f alone on velocity and position, ∫ R f and ∫∫ R f. With position p, velocity v and rotation R of the IMU at
+/// the first time, p⁺ at the second is p + v Δ + ½ g Δ² + R `position`, v⁺ is v + g Δ + R `velocity`. C. Forster et
+/// al., "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry", TRO 33(1), 2017.
 struct ImuStep {
   double dt_s = 0.0;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< first_from_second

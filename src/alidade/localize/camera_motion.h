@@ -20,7 +20,7 @@ struct CameraMotion {
 inline constexpr int motion_dim = 12;
 using MotionMatrix = Eigen::Matrix<double, motion_dim, motion_dim>;
 
-/// The same a time later at constant velocity and rate: r + vΔ, q exp(ωΔ).
+/// The motion after a time Δ at constant velocity and rate: r + vΔ, q exp(ωΔ).
 /// A. J. Davison et al., "MonoSLAM: Real-Time Single Camera SLAM", PAMI 29(6), 2007, eq. (6), with ω in the camera.
 [[nodiscard]] CameraMotion moved(const CameraMotion& motion, double dt_s);
 
@@ -31,7 +31,7 @@ struct MotionJacobians {
 };
 [[nodiscard]] MotionJacobians motion_jacobians(const CameraMotion& motion, double dt_s);
 
-/// Q = G diag((σ_a Δ)² I, (σ_α Δ)² I) Gᵀ: accelerations that are drawn again for each Δ.
+/// Q = G diag((σ_a Δ)² I, (σ_α Δ)² I) Gᵀ: accelerations constant during Δ, independent between steps.
 [[nodiscard]] MotionMatrix motion_noise(const MotionJacobians& jacobians, double sigma_a_m_s2,
                                         double sigma_alpha_rad_s2, double dt_s);
 

@@ -29,20 +29,20 @@ struct LocalizationFilterConfig {
   /// Of the pixel by which a new feature is defined; 0: sigma_px. A patch that is looked for as it was first seen is
   /// there by definition.
   double sigma_new_px = 0.0;
-  double sigma_a_m_s2 = 1.0;        ///< Acceleration between predictions; a hand's is about 4.
-  double sigma_alpha_rad_s2 = 1.5;  ///< Angular acceleration; a hand's is about 6.
-  int max_iterations = 4;           ///< Gauss–Newton steps of an update.
-  double gate = 13.8;               ///< χ² of two components: 99.9 %.
-  double bend_tolerance = 0.05;     ///< Iterate while innovations are further from linear than so many σ.
-  bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
-  bool finds_consensus = true;      ///< One-point consensus where observations disagree: mismatches.
-  double consensus_above = 0.0;     ///< Share of the observations that may disagree before a consensus is looked for.
-  /// No observation says how the world is rotated or how large it is, and so the covariance says: world_turn.h,
-  /// world_scale.h. False: as in the literature before 2001, more certain with every frame.
+  double sigma_a_m_s2 = 1.0;          ///< Acceleration between predictions; a hand's is about 4.
+  double sigma_alpha_rad_s2 = 1.5;    ///< Angular acceleration; a hand's is about 6.
+  int max_iterations = 4;             ///< Gauss–Newton steps of an update.
+  double gate = 13.8;                 ///< χ² of two components: 99.9 %.
+  double curvature_tolerance = 0.05;  ///< Iterate while the nonlinearity of an innovation exceeds so many σ.
+  bool is_sequential = true;          ///< Known points first, then by growing innovation; false: in the order given.
+  bool finds_consensus = true;        ///< One-point consensus where observations disagree: mismatches.
+  double consensus_above = 0.0;       ///< Share of the observations that may disagree before a consensus is looked for.
+  /// The world's rotation and scale are unobservable, and the covariance is kept consistent with that:
+  /// world_rotation.h, world_scale.h. False: a plain EKF, which wrongly gains information (Julier & Uhlmann, 2001).
   bool holds_frame = true;
-  /// Errors that rotate with the world are straight for small rotations only: an update by a larger one holds the frame
-  /// by its derivatives alone. See world_turn.h.
-  double max_turn_rad = 0.02;
+  /// Above this rotation of an update the errors are not those that rotate with the world, which are linear for small
+  /// rotations only; the frame is then kept by the derivatives alone. See world_rotation.h. [rad]
+  double max_rotation_rad = 0.02;
   double linear_below = 0.1;          ///< Linearity index below which an inverse depth becomes a position.
   std::vector<int> lens_params = {};  ///< Indices of the lens's parameters that are in the state, and their initial σ.
   std::vector<double> sigma_lens_params = {};
@@ -51,16 +51,16 @@ struct LocalizationFilterConfig {
   int observations_capacity = 200;  ///< Measured features of one moment at most.
 };
 
-/// Filters that start differently, until the observations say which is right.
+/// A Gaussian sum of filters with different initial speeds, until the observations decide.
 struct FilterBankConfig {
   int splits = 5;            ///< Parts of the speed aside, to each of two sides; 1: none.
   double spread = 1.5;       ///< The outermost part, in σ.
   double narrowed = 0.5;     ///< σ of a part over the σ of the whole.
-  double min_weight = 40.0;  ///< A part that costs so much more than the best one (−2 ln) is given up.
-  int max_frames = 15;       ///< After so many updates the best one alone goes on.
+  double min_weight = 40.0;  ///< A part whose −2 ln likelihood exceeds the best one's by so much is dropped.
+  int max_frames = 15;       ///< After so many updates only the best one is kept.
 };
 
-/// How features of images are chosen, found again and given up.
+/// How features of images are selected, tracked and dropped.
 struct ImageFeatureConfig {
   int min_found = 30;  ///< New ones are added while fewer are found in an image.
   int max_tried = 40;  ///< Looked for in an image, the oldest first: they drift least.
@@ -76,7 +76,7 @@ struct ImageFeatureConfig {
   double near_rad = 0.15;        ///< and angle.
 };
 
-/// What is known of a point's depth before it is seen: along the optical axis where it is first seen.
+/// Prior of a point's depth along the optical axis of the camera that first sees it.
 struct GivenDepth {
   long id = 0;
   double depth_m = 1.0;
@@ -92,7 +92,7 @@ struct LocalizeStart {
   std::vector<GivenDepth> depths = {};
 };
 
-/// Where images show the scene: elsewhere nothing is chosen or looked for.
+/// Mask of the image area that shows the scene: no features elsewhere.
 struct ImageMask {
   int width_px = 0, height_px = 0;
   std::vector<std::uint8_t> shows = {};  ///< Row by row; 0: not.
@@ -136,12 +136,12 @@ struct LocalizeConfig {
   std::vector<DepthReading> depth_readings = {};  ///< In order of time: scale without a target, else a check of it.
   std::vector<RangeReading> range_readings = {};  ///< The same, of `beam`.
   std::optional<Beam> beam = {};
-  std::vector<OdometryReading> odometry_readings = {};  ///< The same, by the lengths of its ways.
+  std::vector<OdometryReading> odometry_readings = {};  ///< The same, by the lengths travelled.
   double sigma_odometry = 0.01;  ///< Of a length, relative: what all of them share, as a wheel's radius.
-  std::optional<Imu> imu = {};   ///< Scale without a target, else a check of it; the smoothed path heeds it.
+  std::optional<Imu> imu = {};   ///< Scale without a target, else a check of it; used by the smoothed path.
   std::optional<ImageMask> mask = {};
   bool masks_circle = false;  ///< Images show the scene in a circle, as an endoscope's: found in the first that does.
-  bool masks_still = false;   ///< What never moves while the scene does is found on the way and not looked at.
+  bool masks_still = false;   ///< What never moves while the scene does is detected and masked.
   double period_s = 0.0;      ///< Usual time between frames. 0: the median so far; of images the least.
   bool smooths = true;        ///< With a target: the path is solved again from all observations after the last frame.
   int max_smoothed = 8000;  ///< Frames solved together: of a longer path every second, fourth, …; the others follow.
@@ -152,9 +152,9 @@ struct LocalizeConfig {
   FilterBankConfig bank = {};
   ImageFeatureConfig features = {};
 
-  std::function<double()> seconds = {};             ///< A clock, if frames are to be timed.
-  std::function<void(const PathStep&)> watch = {};  ///< Is shown each step; what it throws ends the work.
-  /// Is shown each image with what was looked for in it, before `watch` its step.
+  std::function<double()> seconds = {};             ///< A clock [s], if the time per frame is to be measured.
+  std::function<void(const PathStep&)> watch = {};  ///< Called with each step; what it throws ends the work.
+  /// Called with each image and the features searched for in it, before `watch` with its step.
   std::function<void(double t_s, const cv::Mat&, std::span<const ObservationTried>)> watch_image = {};
   /// For studies. Is given what was matched in an image before the filter sees it, and may change it;
   std::function<void(long frame, std::vector<FeatureObservation>&)> disturb = {};

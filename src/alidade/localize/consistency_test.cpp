@@ -4,7 +4,7 @@
 #include <string>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/localize/filter/world_turn.h"
+#include "alidade/localize/filter/world_rotation.h"
 #include "alidade/testing/desk_walk.h"
 #include "alidade/testing/localize_sample.h"
 
@@ -98,12 +98,12 @@ TEST(Consistency, TheUnturnedPlaceAndItsDerivativeBelongTogether) {
   constexpr double h = 1e-6;
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d turn = h * Eigen::Vector3d::Unit(axis);
-    const WorldTurn there(world_from_cam, R.transpose() * turn);
+    const WorldRotation there(world_from_cam, R.transpose() * turn);
     const Feature moved = there.feature_before(feature, no_error);
     const Eigen::Vector<double, 6> numeric = (moved.values - feature.values) / h;
-    EXPECT_LT((numeric - J_before_turn(feature).col(axis)).norm(), 1e-6);
+    EXPECT_LT((numeric - J_before_rotation(feature).col(axis)).norm(), 1e-6);
     // Rotated back, it is where it was: an error of the rotation alone moves nothing else.
-    EXPECT_LT((WorldTurn::turned(there.G(), moved).values - feature.values).norm(), 1e-11);
+    EXPECT_LT((WorldRotation::turned(there.G(), moved).values - feature.values).norm(), 1e-11);
   }
 }
 

@@ -15,8 +15,8 @@ namespace alidade {
 /// A pose has six components, a point two.
 inline constexpr std::size_t min_observations = 3;
 
-/// A path while it is made: the filters, and what is kept of them from frame to frame. Two front ends drive it, one
-/// with observations that were made elsewhere, one that makes them in images.
+/// The estimator behind localize(): the filters, and the state kept from frame to frame. Two front ends drive it, one
+/// for given observations, one that makes them from images.
 class LocalizeEngine {
  public:
   /// `config` as resolved() gives it; it must live longer.

@@ -51,8 +51,8 @@ struct MapPoint {
   std::size_t num_seen = 0;
 };
 
-/// Something that is taken as given: how it would move the path, and what the observations say of it (a score test:
-/// what one more free parameter would come to, by the linearisation that is there anyway).
+/// A parameter taken as given: how an error of it would move the path, and its score test (Lagrange multiplier test):
+/// the value that it would take were it estimated too, by the linearisation at the solution.
 struct GivenNumber {
   /// "focal length", "centre u", "centre v", "k1", "scale of the target", "shape of the target", "speed of the target",
   /// "readout" (of a rolling shutter, first row to last), "clock"
@@ -60,36 +60,38 @@ struct GivenNumber {
   double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px, m/s, s), in its σ,
   std::string_view moved = {};  ///< which that is,
   double moved_by = 0.0;        ///< and by how much [m or rad].
-  double asked = 0.0, z = 0.0;  ///< The change that the observations ask for, in units, and over its own σ.
+  double asked = 0.0, z = 0.0;  ///< The change that the score test indicates, in units, and over its σ.
   std::optional<double> sigma;  ///< Counted, in units. None: not known.
 };
 
-/// What a sensor beside the camera says of the path's unit of length.
+/// The scale of the path by another sensor.
 struct SensorScale {
   std::string sensor;      ///< "depth sensor", "rangefinder", "odometry", "IMU"
-  double scale = 1.0;      ///< Metres for each unit that the path had without it: 1 where a target is right.
+  double scale = 1.0;      ///< Metres per unit of the path without it: 1 where a target gave correct metres.
   double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
-  bool is_in_time = true;  ///< There are readings of when the path was made.
+  bool is_in_time = true;  ///< There are readings within the time span of the path.
 };
 
-/// What the mean residual along the radius is, in rings about the principal point.
+/// Mean radial residual in rings about the principal point.
 struct RadialStructure {
   double share = 0.0;          ///< RMS over the rings of the mean residual over σ: 0 for a right lens.
   double chi2_per_ring = 0.0;  ///< Squares of these means over their own σ, were observations independent.
   double worst_px = 0.0;       ///< The largest mean residual.
 };
 
-/// What residuals share that should be independent.
+/// Dependence between residuals that should be independent.
 struct ResidualStructure {
-  double colour = 0.0;        ///< Correlation of a point's residual with that of the frame before.
-  double sigma_colour = 1.0;  ///< Of that, were they independent.
-  /// Whether that is more than chance and worth a word.
-  [[nodiscard]] bool has_colour() const { return colour > 0.25 && colour > 4.0 * sigma_colour; }
-  double place_chi2 = 0.0;   ///< Of the mean residuals of 4 × 3 parts of the image, over their count: 1 where right.
-  double place_limit = 1e9;  ///< 99.9 % of that.
-  double worst_px = 0.0;     ///< The largest mean,
-  std::string worst_place;   ///< and where: "upper left".
+  double autocorrelation = 0.0;        ///< Correlation of a point's residual with that of the frame before.
+  double sigma_autocorrelation = 1.0;  ///< Of that, were they independent.
+  /// Whether that is significant and large enough to matter.
+  [[nodiscard]] bool is_autocorrelated() const {
+    return autocorrelation > 0.25 && autocorrelation > 4.0 * sigma_autocorrelation;
+  }
+  double mean_chi2 = 0.0;  ///< Of the mean residuals of 4 × 3 parts of the image, over their count: 1 where right.
+  double mean_chi2_limit = 1e9;  ///< 99.9 % of that.
+  double worst_px = 0.0;         ///< The largest mean,
+  std::string worst_region;      ///< and where: "upper left".
 };
 
 /// How far an estimated path is from the true one. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM
@@ -107,7 +109,7 @@ struct PathError {
   std::size_t num_pairs = 0;
 };
 
-/// Everything that localize() has to say: the path, the map, and what they are worth.
+/// The result of localize(): the path, the map, and the verdict.
 struct Localization {
   std::vector<PathStep> path;  ///< One per frame.
   std::vector<MapPoint> map;   ///< At the end.
@@ -123,18 +125,18 @@ struct Localization {
   double still_share = 0.0;   ///< Of the image, edges that never move while the scene does: masked.
   double sigma_px =
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
-  std::size_t num_lost = 0;  ///< Frames without a pose that observations hold: waiting or predicted.
+  std::size_t num_lost = 0;  ///< Frames whose pose observations do not constrain: waiting or predicted.
   std::size_t num_restarts = 0;
-  std::size_t num_left = 0;                           ///< Times that a point left a full filter.
-  std::size_t num_loops = 0, num_loops_rejected = 0;  ///< Returns to what was seen long before; of those not believed.
+  std::size_t num_left = 0;                           ///< Times that a point was removed from a full filter.
+  std::size_t num_loops = 0, num_loops_rejected = 0;  ///< Loop closures; of these rejected.
   std::size_t num_observations = 0, num_used = 0, num_gated = 0, max_seen = 0;
   std::size_t num_known = 0, num_known_gated = 0;
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
   /// How far the target's points have gone in the map from their given positions: squares over σ², per number.
   double known_shift = std::numeric_limits<double>::quiet_NaN();
-  RadialStructure radial;                ///< Of what observations are off after the update: what a wrong lens leaves.
-  std::size_t num_alike = 1;             ///< Things seen at once that might be the target, where a start failed for it.
-  Camera camera;                         ///< As it is at the end.
+  RadialStructure radial;     ///< Of the residuals after the update: shows a wrong lens.
+  std::size_t num_alike = 1;  ///< Candidates for the target in one image, where initialisation failed because of them.
+  Camera camera;              ///< As it is at the end.
   std::vector<std::string> lens_params;  ///< Of the camera's parameters those that were estimated,
   Eigen::VectorXd sigma_lens;            ///< and their σ.
   std::optional<Camera> given_camera;    ///< Where the observations contradict it: estimated without it, with the path.
@@ -142,7 +144,7 @@ struct Localization {
   PathError error;                       ///< With truth.
   bool is_scale_given = true;            ///< As in LocalizeTarget; also where the config has its σ.
   bool is_board = false;                 ///< The target is a printed board, which has one side.
-  bool is_behind = false;                ///< Most poses are on the side of a flat target from which it is not seen.
+  bool is_behind = false;                ///< Most poses are behind the flat target, where it is not visible.
   ResidualStructure residuals;           ///< Of a smoothed path.
   bool is_smoothed = false;         ///< Path and map are from all observations together, not each from those before it.
   std::size_t smoothed_every = 1;   ///< Of so many frames one was solved for, those between follow: a long recording.
@@ -152,7 +154,7 @@ struct Localization {
   double widened = 1.0;
   /// Of a smoothed path: the camera hardly moves aside, and its least certain components are less sure than their σ.
   bool is_from_one_place = false;
-  std::vector<GivenNumber> given;  ///< What was given, and what it does.
+  std::vector<GivenNumber> given;  ///< What was given, and its effect on the path.
   double lens_pull = 0.0;          ///< Of a lens that was estimated: how far from what was given, in the given σ.
 
   Counts counts;  ///< Of frames, and rows that were rejected.

@@ -45,7 +45,7 @@ class ObservationLocalizer {
   [[nodiscard]] double contradiction_of(const StartHypothesis& from) const;
   [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame) const;
   [[nodiscard]] int num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
-  /// Nothing says where the world is, nor how large.
+  /// Neither the frame nor the scale of the world is given.
   [[nodiscard]] bool is_free() const { return !config_.start && config_.target.points.empty(); }
   [[nodiscard]] bool begin_again(Doubt doubt);
   [[nodiscard]] bool restart(const ObservationFrame& frame, Doubt doubt);

@@ -111,7 +111,7 @@ TEST(LocalizeFace, AnswersEveryHostileNumber) {
     using Filter = LocalizationFilterConfig;
     for (double Filter::*member :
          {&Filter::sigma_px, &Filter::sigma_new_px, &Filter::sigma_a_m_s2, &Filter::sigma_alpha_rad_s2, &Filter::gate,
-          &Filter::bend_tolerance, &Filter::consensus_above, &Filter::max_turn_rad, &Filter::linear_below,
+          &Filter::curvature_tolerance, &Filter::consensus_above, &Filter::max_rotation_rad, &Filter::linear_below,
           &Filter::sigma_scale})
       expect_refused([&](LocalizeConfig & c) -> auto& { return c.filter.*member; });
     for (double FilterBankConfig::*member :

@@ -33,7 +33,7 @@ struct SavedKeyframe {
   GreyPatch thumbnail;
 };
 
-/// A map that a run has made, for another to begin in: `localize --map`.
+/// The map of a run, for later runs to start in: `localize --map`.
 struct SavedMap {
   bool is_in_metres = false;
   std::vector<SavedPoint> points = {};

@@ -13,7 +13,7 @@ namespace cv {
 class Mat;
 }
 
-/// What a camera saw on its way: observations of numbered points, or images.
+/// The input of localize(): observations of numbered points, or images.
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
@@ -46,7 +46,7 @@ struct ImageStream {
   std::size_t num_images = 0;  ///< For progress; 0: not known.
 };
 
-/// A feature looked for in an image: for those who draw it.
+/// A feature searched for in an image: for drawing.
 struct ObservationTried {
   long id = 0;
   Eigen::Vector2d expected_px = Eigen::Vector2d::Zero();

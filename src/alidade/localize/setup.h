@@ -13,7 +13,7 @@ void require_sense(const LocalizeConfig& config, const Camera& camera);
 void require_sense(const ObservationFrame& frame, double last_t_s);
 void require_sense(std::span<const TimedPose> truth);
 
-/// The camera as the config lets it be known.
+/// The camera with the distortion that the config allows.
 [[nodiscard]] Camera known_camera(const Camera& camera, const LocalizeConfig& config);
 
 /// The config as a run uses it: what may be given in two places, or not at all, stands in one; `filter` is that of

@@ -11,7 +11,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A point whose position is known before: it gives scale and frame.
+/// A point whose position is known: it gives scale and frame.
 struct KnownPoint {
   long id = 0;
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// The usual time between frames, as they come: the median of the gaps so far (of an even number the upper one), by two
+/// Running median of the time between frames: of the gaps so far (of an even number the upper one), by two
 /// heaps, so that a frame costs no more the more there were.
 class UsualGap {
  public:

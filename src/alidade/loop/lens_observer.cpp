@@ -10,14 +10,14 @@ namespace {
 /// σ of intrinsics where the camera file states none: that of a typical calibration.
 constexpr double ordinary_focal_share = 0.003, ordinary_centre_px = 2.0;
 
-LensNow believed_at_first(const Camera& camera) {
-  LensNow now = own_lens(camera);
+IntrinsicsSample believed_at_first(const Camera& camera) {
+  IntrinsicsSample now = own_lens(camera);
   if (!(now.sigma.head<2>().minCoeff() > 0.0)) now.sigma.head<2>() = ordinary_focal_share * now.k.head<2>();
   if (!(now.sigma.tail<2>().minCoeff() > 0.0)) now.sigma.tail<2>().setConstant(ordinary_centre_px);
   return now;
 }
 
-HybridConfig observer_config(const RigHead& head, std::size_t num_points, const LensNow& first) {
+HybridConfig observer_config(const RigHead& head, std::size_t num_points, const IntrinsicsSample& first) {
   HybridConfig config;
   config.num_points = num_points;
   config.scale.scale = 0.5 * head.camera.width_px;
@@ -27,7 +27,7 @@ HybridConfig observer_config(const RigHead& head, std::size_t num_points, const 
   config.fine_enough = 2.0 * ordinary_focal_share;  // a calibrated lens may zoom as soon as there is an estimate
   CommonPrior prior(config.start);
   prior.sigma_k = first.sigma / config.scale.scale;
-  prior.says_k = {true, true, true, true};
+  prior.is_given_k = {true, true, true, true};
   config.prior = prior;
   return config;
 }
@@ -56,7 +56,7 @@ class TurnSpread {
 
 struct LensObserver::State {
   RigHead head;
-  LensNow first, now;
+  IntrinsicsSample first, now;
   HybridObserver observer;
   double sigma_encoder_rad;
   TurnSpread spread;
@@ -84,12 +84,12 @@ struct LensObserver::State {
   /// Focal lengths as observed, their σ with the encoders' share: no more than was known before any rotation. The
   /// principal point stays the camera's: rotation hardly distinguishes it from the mounting, and a zoom by m multiplies
   /// its error by m.
-  [[nodiscard]] LensNow lens_of(const IntrinsicsEstimate& estimate) const {
-    const LensNow own = own_lens(head.camera);
+  [[nodiscard]] IntrinsicsSample lens_of(const IntrinsicsEstimate& estimate) const {
+    const IntrinsicsSample own = own_lens(head.camera);
     const Eigen::Vector2d f = estimate.values().head<2>(), sigma = estimate.sigma.head<2>(),
                           known = first.sigma.head<2>().cwiseQuotient(first.k.head<2>());
     const Eigen::Vector2d by_encoders = spread.variance_of_share(sigma_encoder_rad).cwiseMin(known.cwiseAbs2());
-    LensNow lens;
+    IntrinsicsSample lens;
     lens.k << f, own.k.tail<2>();
     const double misfit = share_of_misfit(estimate);
     const Eigen::Array2d by_turns = by_encoders.array() + misfit * misfit;
@@ -133,7 +133,7 @@ void LensObserver::take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad,
   own.has_estimate = true;
 }
 
-const LensNow& LensObserver::lens() const { return state_->now; }
+const IntrinsicsSample& LensObserver::lens() const { return state_->now; }
 bool LensObserver::has_estimate() const { return state_->has_estimate; }
 
 }  // namespace alidade

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "alidade/pantilt/head.h"
-#include "alidade/pantilt/lens_course.h"
+#include "alidade/pantilt/intrinsics_history.h"
 
 namespace alidade {
 
@@ -24,7 +24,7 @@ class LensObserver {
   /// Pixels of the points in the image taken then, NaN: not seen. Images in order of capture.
   void take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad, std::span<const Eigen::Vector2d> px);
   /// As of the last image; the camera's own before the first estimate.
-  [[nodiscard]] const LensNow& lens() const;
+  [[nodiscard]] const IntrinsicsSample& lens() const;
   [[nodiscard]] bool has_estimate() const;
 
  private:

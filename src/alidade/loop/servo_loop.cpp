@@ -48,7 +48,7 @@ struct LoopedHead {
   HeadServo servo;
   ImageQueue images;
   std::optional<LensObserver> observer;
-  LensNow lens;  ///< Of the newest image that is known.
+  IntrinsicsSample lens;  ///< Of the newest image that is known.
 };
 
 std::array<ServoAxis, 2> true_axes(const ServoScene& scene) {
@@ -139,7 +139,7 @@ ServoRow step(const ServoScene& scene, LoopedHead& looped, double t_s, std::size
   Image image{
       {t_s, row.measured_rad, seen.value_or(Eigen::Vector2d::Zero()), {}}, is_seen, looped.head.seen_background()};
   if (scene.intrinsics == LensKnowledge::truth)
-    image.observation.lens = LensNow{looped.head.intrinsics(), Eigen::Vector4d::Zero()};
+    image.observation.lens = IntrinsicsSample{looped.head.intrinsics(), Eigen::Vector4d::Zero()};
   looped.images.take(std::move(image));
   HeadServoInput input{t_s, row.measured_rad, std::nullopt};
   deliver(scene, looped, t_s, input);

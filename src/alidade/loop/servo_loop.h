@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "alidade/estimation/progress.h"
-#include "alidade/pantilt/lens_course.h"
+#include "alidade/pantilt/intrinsics_history.h"
 #include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/public.h"
 #include "alidade/servo/config.h"
@@ -19,7 +19,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// How the heads really are, as factors on what is known of them.
+/// Model mismatch: the true plants, as factors on the known ones.
 struct PlantMismatch {
   double gain = 1.0, tau = 1.0;
 };
@@ -64,7 +64,7 @@ struct ServoRow {
   bool is_in_image = false;
   std::optional<Eigen::Vector2d> seen_px;  ///< Where the head saw the target, with its noise.
   ServoEvent event = ServoEvent::none;
-  LensNow lens;                                         ///< That this image will be taken by, or the rig's.
+  IntrinsicsSample lens;                                ///< That this image will be taken by, or the rig's.
   Eigen::Vector4d true_lens = Eigen::Vector4d::Zero();  ///< fx, fy, cx, cy. [px]
 };
 

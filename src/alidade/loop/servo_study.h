@@ -64,7 +64,7 @@ struct ServoStudy {
   std::vector<LensComparison> lenses;         ///< Where the lens zooms, or an observer estimates it; else none.
 };
 
-/// Is shown the rows of each controller's first trial as they come.
+/// Called with the rows of each controller's first trial.
 using ServoWatch = std::function<void(ControllerKind, const ServoRow&)>;
 
 /// Every controller over the same seeds. Nothing runs where check_loops finds an unstable loop.
@@ -73,7 +73,7 @@ using ServoWatch = std::function<void(ControllerKind, const ServoRow&)>;
 
 [[nodiscard]] Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study);
 
-/// Everything that servo() has to say: figures of the controllers, and what they are worth.
+/// The result of servo(): figures of the controllers, and the verdict.
 struct ServoResult : ServoStudy {
   ServoScenario scenario;
   std::uint64_t seed = 1;  ///< Of the first run.

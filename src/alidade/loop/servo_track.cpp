@@ -9,18 +9,18 @@ namespace alidade {
 namespace {
 
 /// The intrinsics that the loop had of each image. A row knows those of the newest image that had arrived.
-std::vector<LensCourse> courses_of(const ServoScene& scene, const ServoRun& run) {
-  std::vector<LensCourse> courses(scene.heads.size());
+std::vector<IntrinsicsHistory> histories_of(const ServoScene& scene, const ServoRun& run) {
+  std::vector<IntrinsicsHistory> histories(scene.heads.size());
   for (const ServoRow& row : run.rows) {
-    LensCourse& course = courses[row.head];
+    IntrinsicsHistory& history = histories[row.head];
     const double image = std::floor((row.t_s - scene.latency_s) / scene.period_s + 1e-6);
     const double captured_s = image * scene.period_s;
-    if (image < 0.0 || (!course.t_s.empty() && !(captured_s > course.t_s.back()))) continue;
-    course.t_s.push_back(captured_s);
-    course.lens.push_back(row.lens);
-    course.until_s = row.t_s;
+    if (image < 0.0 || (!history.t_s.empty() && !(captured_s > history.t_s.back()))) continue;
+    history.t_s.push_back(captured_s);
+    history.lens.push_back(row.lens);
+    history.until_s = row.t_s;
   }
-  return courses;
+  return histories;
 }
 
 }  // namespace
@@ -38,7 +38,8 @@ ServoTrack track_of(const ServoScene& scene, const ServoRun& run) {
   }
   Rig rig;
   rig.heads = scene.heads;
-  if (scene.intrinsics != LensKnowledge::given) use_courses(courses_of(scene, run), track.observations, rig);
+  if (scene.intrinsics != LensKnowledge::given)
+    use_intrinsics_histories(histories_of(scene, run), track.observations, rig);
   FollowConfig config;
   config.tracker.sigma_px = scene.sigma_px;
   config.tracker.sigma_encoder_rad = scene.sigma_encoder_rad;

@@ -10,11 +10,11 @@
 
 namespace alidade {
 
-/// What the placing of cameras was given: lenses and a distance, with what they do to it.
+/// What was given to locate the cameras: lenses and a distance, with their effect on the result.
 struct MovingGiven {
   std::vector<Assumption> assumed;  ///< Moves in σ of `cov`, of the cameras' poses.
   /// Of the shared parameters: the solver's, lenses whose covariance is given, and focal lengths that the observations
-  /// half ask to be others.
+  /// contradict, but not significantly.
   Eigen::MatrixXd cov;
   std::vector<FocalScore> focals;
 };

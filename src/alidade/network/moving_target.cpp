@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/network/moving_culprit.h"
+#include "alidade/network/camera_fault.h"
 #include "alidade/network/moving_given.h"
 #include "alidade/network/moving_scale.h"
 #include "alidade/network/moving_solve.h"
@@ -41,7 +41,7 @@ std::optional<std::size_t> head_of(const Placing& work, int id) {
 void read_series(Placing& work) {
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     work.series.push_back(observation_series(work.observations, h, work.heads[h]));
-    PlacedCamera camera;
+    LocatedCamera camera;
     camera.id = work.heads[h].head.id;
     for (const TargetObservation& observation : work.observations) {
       if (observation.head != h) continue;
@@ -164,7 +164,7 @@ void take_results(Placing& work) {
   report.block_s = solved.block_s;
   report.iterations = solved.iterations;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    PlacedCamera& camera = report.cameras[h];
+    LocatedCamera& camera = report.cameras[h];
     if (!camera.placed) continue;
     camera.sigma_px = solved.sigma_px[h];
     const double drift = solved.state.drift[h];
@@ -284,7 +284,7 @@ void set_scale(Placing& work, const TrueTrack& truth) {
     for (Eigen::Vector3d& position : mirrored.position) position.x() *= -1.0;
     const auto other = match_path(report.path_t_s, report.path, mirrored, work.config.clock_search_s > 0.0);
     if (other && other->median_m <= max_misfit * other->extent_m)
-      report.culprit = "the path that was seen is the true one mirrored: the images of all cameras are mirrored";
+      report.camera_fault = "the path that was seen is the true one mirrored: the images of all cameras are mirrored";
     return;
   }
   take_truth(work, *match);
@@ -361,7 +361,7 @@ std::vector<TargetObservation> moved_to(double origin_s, std::span<const TargetO
 
 void move_back(double origin_s, MovingTargetReport& report) {
   const auto move = [origin_s](CameraClock& clock) { clock.offset_s += origin_s * (1.0 - clock.rate); };
-  for (PlacedCamera& camera : report.cameras)
+  for (LocatedCamera& camera : report.cameras)
     if (camera.placed) move(camera.clock);
   move(report.truth_clock);
   for (double& t_s : report.path_t_s) t_s += origin_s;
@@ -385,10 +385,11 @@ MovingTargetReport place_cameras(std::span<const TargetObservation> observations
   };
   MovingTargetReport report = placed(from_origin, heads, truth_from_origin, config);
   constexpr double max_search_s = 30.0;  // of clocks that are farther apart, each trial takes minutes
-  if (report.culprit.empty() && config.clock_search_s <= max_search_s)
-    report.culprit = culprit_of(report, from_origin, heads,
-                                [&](const std::vector<TargetObservation>& some, const std::vector<RigHead>& given,
-                                    bool searches) { return placed(some, given, {}, searches ? config : one_clock); });
+  if (report.camera_fault.empty() && config.clock_search_s <= max_search_s)
+    report.camera_fault =
+        camera_fault_of(report, from_origin, heads,
+                        [&](const std::vector<TargetObservation>& some, const std::vector<RigHead>& given,
+                            bool searches) { return placed(some, given, {}, searches ? config : one_clock); });
   move_back(origin_s, report);
   return report;
 }

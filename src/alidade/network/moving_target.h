@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Where cameras stand that do not rotate, and how their clocks go, from their observations of one target that moves:
+/// Poses and clocks of static cameras from their observations of one moving target:
 /// relative poses of pairs over the clocks' differences, then all cameras and the path (a cubic spline) together by
 /// maximum likelihood. The world is the first camera's, or with a true path that path's, brought there by a similarity
 /// alone. Readings of a head are what they are throughout (its encoder's zero). Does not throw on bad data: the report
@@ -16,7 +16,7 @@ namespace alidade {
                                                std::span<const RigHead> heads, const MovingTargetConfig& config,
                                                const TrueTrack& truth = {}, const Progress& progress = {});
 
-/// What the answer is worth, or why there is none, and what to add.
+/// The verdict on the estimate, or why there is none, and what to add.
 [[nodiscard]] Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTargetConfig& config);
 
 }  // namespace alidade

@@ -263,7 +263,7 @@ TEST(MovingTarget, FalseLabelsAreFound) {
     const MovingTargetReport report = place_cameras(scene.observations, unplaced(scene), config);
     ASSERT_EQ(report.status, PlacedStatus::placed) << seed;
     EXPECT_EQ(moving_target_verdict(report, config).state, State::good) << seed;
-    EXPECT_TRUE(report.culprit.empty()) << report.culprit;
+    EXPECT_TRUE(report.camera_fault.empty()) << report.camera_fault;
     for (std::size_t i = 0; i < is_false.size(); ++i) {
       num_false += is_false[i] ? 1.0 : 0.0;
       false_used += is_false[i] && report.used[i] ? 1.0 : 0.0;

@@ -88,7 +88,7 @@ void add_precision(const MovingTargetReport& report, Verdict& verdict) {
 void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
   std::string left;
   std::size_t num_left = 0;
-  for (const PlacedCamera& camera : report.cameras) {
+  for (const LocatedCamera& camera : report.cameras) {
     if (camera.placed) continue;
     ++num_left;
     left += (left.empty() ? "head " : "; head ") + std::to_string(camera.id) + ": " + camera.reason;
@@ -130,8 +130,8 @@ void add_truth(const MovingTargetReport& report, Verdict& verdict) {
 }  // namespace
 
 Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTargetConfig& config) {
-  if (!report.culprit.empty())
-    return moving_refusal(report.culprit,
+  if (!report.camera_fault.empty())
+    return moving_refusal(report.camera_fault,
                           "give images as the camera takes them (no mirror, no flip), and cameras in the order of the "
                           "heads' numbers");
   if (report.status != PlacedStatus::placed) return refusal_by_status(report, config);
@@ -153,7 +153,7 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
     verdict.state = State::care;
     verdict.to_add = care->text;
   }
-  const auto num = std::ranges::count(report.cameras, true, &PlacedCamera::placed);
+  const auto num = std::ranges::count(report.cameras, true, &LocatedCamera::placed);
   verdict.sentence = std::to_string(num) + " cameras located by a moving target, ± " +
                      text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
                      text_of(3.0 * report.sigma_relative_m, 2) + " m (3σ)";

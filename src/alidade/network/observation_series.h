@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// What one camera that does not rotate saw of the target, by its own clock. In the plane at depth 1.
+/// The observations of the target by one static camera, by its own clock, in the plane at depth 1.
 struct ObservationSeries {
   std::vector<double> t_s;
   std::vector<Eigen::Vector2d> at;       ///< x/z, y/z of the ray.

@@ -44,7 +44,7 @@ struct CameraClock {
 };
 
 /// One camera after the solve.
-struct PlacedCamera {
+struct LocatedCamera {
   int id = 0;
   bool placed = false;
   std::string reason;  ///< Why it was not located; empty otherwise.
@@ -55,7 +55,7 @@ struct PlacedCamera {
   double rms_px = 0.0;                           ///< Per point, of the used observations.
 };
 
-/// By how much the observations ask a camera's focal length to change, all else following: a score test.
+/// The change of a camera's focal length that the observations indicate, all else estimated too: a score test.
 struct FocalScore {
   std::size_t head = 0;
   double asked = 0.0, sigma = 0.0;  ///< Of the focal length, relative; errors over time go together.
@@ -63,7 +63,7 @@ struct FocalScore {
   [[nodiscard]] double sigmas() const { return std::abs(asked) / std::hypot(sigma, given.value_or(0.0)); }
 };
 
-/// Beyond so many σ a focal length is said to be another, as a rig's causes are.
+/// Beyond so many σ a focal length is reported as wrong, as a rig's causes are.
 constexpr double focal_limit = 4.2;
 
 struct MovingTargetReport {
@@ -77,29 +77,29 @@ struct MovingTargetReport {
     no_convergence
   };
   Status status = Status::too_few;
-  Rig rig;                            ///< All heads; those that were not located are as given.
-  std::vector<PlacedCamera> cameras;  ///< One per head.
-  std::vector<bool> used;             ///< One per observation.
-  std::vector<double> path_t_s;       ///< Times of the rig, where two cameras or more saw the target.
-  std::vector<Eigen::Vector3d> path;  ///< The target then.
+  Rig rig;                             ///< All heads; those that were not located are as given.
+  std::vector<LocatedCamera> cameras;  ///< One per head.
+  std::vector<bool> used;              ///< One per observation.
+  std::vector<double> path_t_s;        ///< Times of the rig, where two cameras or more saw the target.
+  std::vector<Eigen::Vector3d> path;   ///< The target then.
   double chi2_per_dof = 0.0;
   double sigma_scale = 0.0;         ///< Relative; of the distance or of the fit to the true path.
-  Eigen::MatrixXd cov_model;        ///< As rig.cov, if every observation erred by itself and lenses were exact.
+  Eigen::MatrixXd cov_model;        ///< As rig.cov, with independent observations and exact lenses.
   ClusterCovariance clusters;       ///< Blocks of time, by the solver's own parameters.
   double block_s = 0.0;             ///< Length of a block.
-  std::string culprit;              ///< What is wrong with a camera, where that is found out; empty: nothing.
+  std::string camera_fault;         ///< What is wrong with a camera, where that is identified; empty: nothing.
   std::vector<Assumption> assumed;  ///< Lenses and the distance.
   std::vector<FocalScore> focals;   ///< One per located camera of which the observations determine it.
   double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
-  /// With a true path: its clock (time of the rig by its own), and what is left after the similarity, over the path.
+  /// With a true path: its clock (time of the rig by its own), and the residuals of the similarity, over the path.
   CameraClock truth_clock;
   double truth_median_m = 0.0, truth_rms_m = 0.0;
   double truth_covered = 0.0;  ///< Share of the path that it covers.
   int iterations = 0;
 };
 
-/// Everything that a placement of cameras has to say: what the solve found (rig, cameras, path …), and what it is
-/// worth.
+/// The result of network(): what the solve found (rig, cameras, path …), with its covariance, counts and
+/// verdict.
 struct NetworkCalibration : MovingTargetReport {
   std::vector<TargetObservation> observations;  ///< As given; `used` says what became of each.
   MovingTargetConfig config;

@@ -23,7 +23,7 @@ enum class RotationKnowledge { known, noisy, free };
 /// Gains of ObserveMethod::fang2011.
 enum class FangProfile {
   fast,    ///< Settles within seconds; for pixels without noise only.
-  quiet,   ///< Bears noise of a third of a pixel; takes twenty seconds.
+  quiet,   ///< Tolerates noise of a third of a pixel; takes twenty seconds.
   kalman,  ///< The same regression with optimal gains.
 };
 
@@ -31,20 +31,20 @@ enum class FangProfile {
 struct ObserveConfig {
   ObserveMethod method = ObserveMethod::hybrid;
   RotationKnowledge rotation = RotationKnowledge::known;  ///< Of logs; photos and matches have no measured rotation.
-  /// What is estimated beside fx, fy, cx, cy, by words: auto (what the residuals ask for), none, or of k1, k2, k3, p1,
+  /// What is estimated beside fx, fy, cx, cy, by words: auto (what the residuals indicate), none, or of k1, k2, k3, p1,
   /// p2, mount, delay, lever, shutter, focal-drift, and of the measured rotation scale, backlash, curve, drift, bias,
   /// clock (its rate against the images').
   /// Empty: auto of methods that can, else none.
   std::vector<std::string> estimate = {};
-  /// An initial guess, and the lens: pixels are freed of its distortion where no part of it is estimated.
+  /// An initial guess, and the lens: pixels are undistorted by it where no distortion is estimated.
   std::optional<Camera> camera = {};
-  int width_px = 0, height_px = 0;  ///< Of the images; 0: the camera's, else what holds the pixels.
+  int width_px = 0, height_px = 0;  ///< Of the images; 0: the camera's, else the smallest that contains the pixels.
   std::optional<Eigen::Vector4d> start =
       {};  ///< Initial guess: fx, fy, cx, cy [px]; none: the camera's, or the data's.
   FangProfile profile = FangProfile::kalman;
-  bool square_pixels = false;                   ///< fx = fy.
-  bool no_zoom = false;                         ///< The intrinsics are those of one camera: what seems a zoom is none.
-  bool fixed_centre = false;                    ///< cx, cy: the initial guess's, else the image's centre.
+  bool square_pixels = false;  ///< fx = fy.
+  bool no_zoom = false;        ///< The intrinsics are constant: what looks like a zoom has another cause.
+  bool fixed_centre = false;   ///< cx, cy: the initial guess's, else the image's centre.
   std::optional<Eigen::Vector3d> lever_m = {};  ///< Camera centre from the centre of rotation, camera frame; known, or
                                                 ///< (where it is estimated) the initial guess.
   std::optional<double> sigma_px = {};          ///< Of a pixel coordinate; none: estimated from the residuals.

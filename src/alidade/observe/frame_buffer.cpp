@@ -142,7 +142,7 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   RotationBundleConfig solve;
   solve.nuisances = config.nuisances;
   solve.with_depth = config.with_depth;
-  solve.sigma_turn_rad = config.sigma_turn_rad;
+  solve.sigma_rotation_rad = config.sigma_rotation_rad;
   solve.sigma_rate_rad_per_s = config.sigma_rate_rad_per_s;
   solve.sigma_range_m = config.sigma_range_m > 0.0 ? config.sigma_range_m : 1e-3;
   const bool sigma_is_known = config.sigma_px > 0.0;

@@ -7,8 +7,8 @@
 
 namespace alidade {
 
-/// The last frames, with normalised pixels, in room that is taken once. When it is full every second frame goes.
-/// A point that slipped, or that was seen before a gap, goes on as another one.
+/// The last frames, with normalised pixels, in preallocated memory. When it is full every second frame is dropped.
+/// A point that slipped, or was last seen before a gap, continues as a new point.
 class FrameBuffer {
  public:
   FrameBuffer(std::size_t num_points, std::size_t capacity);
@@ -48,7 +48,7 @@ struct AdjustConfig {
   double sigma_px = 0.0;  ///< Normalised; 0: estimated from the residuals.
   double sigma_range_m = 0.0;
   std::size_t range_point = 0;
-  double sigma_turn_rad = 0.0;
+  double sigma_rotation_rad = 0.0;
   double sigma_rate_rad_per_s = 0.0;
   bool reject = true;                ///< Reject what lies beyond 6 σ.
   std::optional<CommonPrior> prior;  ///< None: a weak one about wherever the answer is.

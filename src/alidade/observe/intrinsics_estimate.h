@@ -15,8 +15,8 @@ enum class ObserveEvent {
   burst,        ///< An outlier frame was rejected.
   slip,         ///< An outlier point was rejected; see `point`.
   zoom,         ///< The intrinsics are changing.
-  zoom_end,     ///< They have come to rest.
-  restart,      ///< Estimated again from the last seconds.
+  zoom_end,     ///< They are constant again.
+  restart,      ///< Reinitialised from the last seconds.
   new_segment,  ///< A gap: the rotation across it is not known.
 };
 
@@ -34,8 +34,8 @@ struct IntrinsicsEstimate {
   [[nodiscard]] Eigen::Vector4d values() const { return {fx, fy, cx, cy}; }
 };
 
-/// Pixels to numbers near one: q = (px − centre) / scale, so that every equation keeps its form and its condition falls
-/// from 7·10⁷ to 3·10².
+/// Normalisation of pixels: q = (px − centre) / scale, so that every equation keeps its form and the condition number
+/// falls from 7·10⁷ to 3·10². Hartley & Zisserman, 2003, §4.4.
 struct PixelScale {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Centre of the image. [px]
   double scale = 1.0;                                ///< About half its width. [px]

@@ -13,7 +13,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What is known of a rotating camera now.
+/// The current estimate of a rotating camera.
 struct ObservedNow {
   int width_px = 0, height_px = 0;
   Eigen::Vector4d k_px{0.0, 0.0, 0.0, 0.0};  ///< fx, fy, cx, cy.
@@ -48,8 +48,8 @@ struct MovePlan {
   Verdict verdict = {};
 };
 
-/// The moves that lower the uncertainty of fx, fy, cx, cy most, one after the other. Throws ConfigError for a config or
-/// a camera that cannot be.
+/// The moves that lower the uncertainty of fx, fy, cx, cy most, one after the other. Throws ConfigError for an
+/// invalid config or camera.
 [[nodiscard]] MovePlan plan_moves(const ObservedNow& now, const MoveConfig& config = {}, const Progress& progress = {});
 
 /// What a report knows of its camera, and where the points were seen last. Throws ConfigError where it has no camera.

@@ -15,7 +15,7 @@ struct MoveLimits {
 };
 
 /// The moves that lower the uncertainty of fx, fy, cx, cy most, one after the other: each is the best of rotations in
-/// eight directions and three lengths (and rolls), by the information of the pixels on the way, with the points'
+/// eight directions and three lengths (and rolls), by the information of the pixels along the move, with the points'
 /// bearings unknown. Empty: no point is seen, or none stays in the image.
 [[nodiscard]] std::vector<NextMove> plan_next_moves(const ObservedNow& now, const MoveLimits& limits, int num_moves,
                                                     const Progress& progress = {});

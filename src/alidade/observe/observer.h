@@ -22,8 +22,8 @@ struct ObserveStep {
   std::optional<TrueIntrinsics> truth = {};
 };
 
-/// observe() of rows that come one by one: each is answered at once by the hybrid method, and finish() gives the report
-/// that observe() gives of all of them; of a stream that is longer than `keep_rows` of its newest rows, and says so.
+/// Incremental observe(), row by row: push() returns the estimate of the hybrid method at once, and finish() the report
+/// of observe() on all rows; of a stream longer than `keep_rows` on the newest, and the report says so.
 class Observer {
  public:
   /// `layout`: a log without rows, which says what rows have: the source of the rotation, how many points (0: as many
@@ -34,7 +34,7 @@ class Observer {
   Observer(Observer&&) noexcept;
   Observer& operator=(Observer&&) noexcept;
 
-  /// Throws ConfigError for a row that cannot be, and goes on behind it.
+  /// Throws ConfigError for an invalid row, which is skipped.
   ObserveStep push(RotationRow row, const std::optional<TrueIntrinsics>& truth = {});
   /// The same with ω (source rate) or pan, tilt, roll (source head), and a pixel per point; NaN: not seen.
   ObserveStep push(double t_s, const Eigen::Vector3d& rotation, std::span<const Eigen::Vector2d> px);

@@ -32,7 +32,7 @@ struct ObserveMotion {
 };
 
 /// One value with σ and the Cramér–Rao bound of this very log. σ counts errors that residuals share and what is given
-/// with a σ; sigma_model: as if every pixel erred by itself.
+/// with a σ; sigma_model: with independent pixel errors.
 struct ObservedQuantity {
   std::string name;
   double value = 0.0, sigma = 0.0, bound = 0.0, sigma_model = 0.0;
@@ -45,18 +45,18 @@ struct ObserveResidual {
   Eigen::Vector2d px = Eigen::Vector2d::Zero(), residual_px = Eigen::Vector2d::Zero();
 };
 
-/// Something that was taken as exact, and whether the residuals ask for it: z is the gain as a normal deviate.
+/// Something taken as exact, and whether the residuals indicate it: z is the improvement as a normal deviate.
 struct TestedCause {
   struct Value {
     std::string name, unit;
-    double value = 0.0, sigma = 0.0;  ///< What the residuals ask for.
+    double value = 0.0, sigma = 0.0;  ///< What the residuals indicate.
   };
   std::string name;
   double z = 0.0;
   std::vector<Value> values = {};
 };
 
-/// What makes σ larger than if every pixel erred by itself.
+/// Why σ is larger than it would be with independent pixel errors.
 struct SharedErrors {
   double design_effect = 1.0;                 ///< Variance between blocks of time (photos) over the model's.
   double correlation_s = 0.0, block_s = 0.0;  ///< How long errors of a track last; length of a block.
@@ -70,12 +70,12 @@ struct RotatedPhoto {
   int num_points = 0;
   double rms_px = 0.0;                  ///< Per point.
   double turn_rad = 0.0;                ///< Rotation from the first photo that is used.
-  double z2 = 0.0;                      ///< What leaving it out changes, over what the model expects of that; squared.
+  double z2 = 0.0;                      ///< Squared change of the estimate without it, over its expectation.
   double zoom = 1.0, sigma_zoom = 0.0;  ///< Its focal length over the others', if it may have one of its own.
   Eigen::Matrix3d cam_from_world = Eigen::Matrix3d::Identity();
 };
 
-/// How much the camera's centre moved, by the residuals: what is along the lines to one point less what is across them.
+/// How much the camera's centre moved, by the residuals along the epipolar lines less those across them.
 struct ParallaxTest {
   double z = 0.0;  ///< Of the pair that shows it most.
   int photo_a = -1, photo_b = -1;
@@ -90,14 +90,14 @@ struct MatchCounts {
   std::size_t kept = 0;      ///< With one camera.
 };
 
-/// Everything that observe() has to say of a log, or of photos: what they determine, and how well. Where there is no
-/// answer camera, quantities and covariance are empty, and the verdict says why.
+/// The result of observe() on a log or photos: what they determine, and how well. Where there is no
+/// estimate, camera, quantities and covariance are empty, and the verdict says why.
 struct ObserveReport {
   enum class Status {
     ok,
     too_few_data,
     unobservable,
-    unsteady,  ///< The focal length changes all the time, and the method is for one that does not.
+    focal_length_varies,  ///< The focal length changes all the time, and the method needs a constant one.
     no_convergence
   };
   Status status = Status::too_few_data;
@@ -106,7 +106,7 @@ struct ObserveReport {
   std::vector<Assumption> assumed;
 
   int width_px = 0, height_px = 0;  ///< Of the images.
-  bool size_is_guessed = false;     ///< What holds the pixels: nobody gave it.
+  bool size_is_guessed = false;     ///< Not given: the smallest size that contains the pixels.
   Camera camera;                    ///< At the end of the log, with its covariance.
   /// fx, fy, cx, cy [px], then what else was estimated: k1, …, mount_x_rad…, delay_s, lever_x_m….
   std::vector<ObservedQuantity> quantities;

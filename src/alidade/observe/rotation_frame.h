@@ -31,7 +31,7 @@ struct RotationFrame {
   std::span<const Eigen::Vector2d> px;  ///< One per point; NaN: not seen.
 };
 
-/// Turns rows into frames as they come. Rates are integrated by the third-order Adams–Moulton rule for uneven steps
+/// Converts rows to frames one by one. Rates are integrated by the third-order Adams–Moulton rule for uneven steps
 /// with the commutator term, so that the sampling of a smooth motion costs 10⁻⁷ rad, not 10⁻⁵; heads and attitudes are
 /// taken as they are. A row whose rotation was not measured gives a frame without pixels; a gap of a rate log that is
 /// longer than `max_gap_s` starts a segment. Allocates nothing.

@@ -14,8 +14,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// How the readings of a head become angles of its axes: angle = scale · (reading + c cos reading + s sin reading −
-/// zero). c and s are what a disc that sits off its axis does: an error of one period per revolution.
+/// From the readings of a head to the angles of its axes: angle = scale · (reading + c cos reading + s sin reading −
+/// zero). c and s model an eccentric encoder disc: an error of one period per revolution.
 struct Encoder {
   double pan_zero_rad = 0.0;  ///< What is read, corrected, where the pan angle is zero.
   double tilt_zero_rad = 0.0;
@@ -26,7 +26,7 @@ struct Encoder {
 
   /// Readings without the error of one period per revolution.
   [[nodiscard]] Eigen::Vector2d corrected(const Eigen::Vector2d& readings_rad) const;
-  /// What an angle moves by for a reading.
+  /// ∂ angle / ∂ reading of (pan, tilt).
   [[nodiscard]] Eigen::Vector2d slopes(const Eigen::Vector2d& readings_rad) const;
   [[nodiscard]] Eigen::Vector2d angles(const Eigen::Vector2d& readings_rad) const;
   [[nodiscard]] Eigen::Vector2d readings(const Eigen::Vector2d& angles_rad) const;
@@ -63,7 +63,7 @@ inline constexpr std::array<const char*, num_head_params> head_param_names{
     "pan_to_tilt_x_m", "pan_to_tilt_y_m", "pan_to_tilt_z_m", "tilt_to_cam_x_m", "tilt_to_cam_y_m", "tilt_to_cam_z_m",
     "cam_rx_rad",      "cam_ry_rad",      "cam_rz_rad",      "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",
     "tilt_scale",      "axes_skew_rad",   "pan_cos_rad",     "pan_sin_rad",     "tilt_cos_rad",    "tilt_sin_rad"};
-/// Where they begin, by name; tilt and its like stand behind pan's.
+/// Index of each one's first component; tilt's index follows pan's.
 inline constexpr int base_param = 0, base_rotation_param = 3, pan_to_tilt_param = 6, tilt_to_cam_param = 9,
                      cam_rotation_param = 12, pan_zero_param = 15, pan_scale_param = 17, tilt_scale_param = 18,
                      axes_skew_param = 19, pan_cos_param = 20, pan_sin_param = 21, tilt_cos_param = 22,
@@ -125,12 +125,12 @@ struct HeadPixelOfParams {
                                                                  const Eigen::Vector2d& pan_tilt_rad,
                                                                  const Eigen::Vector3d& point_in_world);
 
-/// A straight line of observation.
+/// The ray of an observation.
 struct WorldRay {
   Eigen::Vector3d origin_in_world;
   Eigen::Vector3d direction_in_world;  ///< Unit vector.
 };
-/// What a pixel looks along, at these readings. None where the lens has no ray there.
+/// The ray of a pixel, at these readings. None where the lens has no ray there.
 [[nodiscard]] std::optional<WorldRay> ray_in_world(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
                                                    const Eigen::Vector2d& px);
 

@@ -15,7 +15,7 @@ ALIDADE_PUBLIC_BEGIN
 /// Ids of the heads that have views, ascending.
 [[nodiscard]] std::vector<int> heads_of(std::span<const HeadView> views);
 
-/// What is wrong with so many cameras for these heads: "has 2 heads (1, 2), but there are 3 cameras; …"; else empty.
+/// What is wrong with so many cameras for these heads: "has 2 heads (1, 2), but there are 3 cameras; …"; else "".
 [[nodiscard]] std::string camera_count_fault(const std::vector<int>& ids, std::size_t num_cameras);
 
 /// One camera for all heads, or one for each in the order of their ids. Throws ConfigError for another number.
@@ -24,7 +24,7 @@ ALIDADE_PUBLIC_BEGIN
 /// Heads of which the cameras alone are known, in the order of their ids.
 [[nodiscard]] std::vector<RigHead> heads_with(const std::map<int, Camera>& cameras);
 
-/// A corner beyond its camera's image is of another camera: names the first one. Empty where there is none.
+/// Names the first corner that lies outside its camera's image, and so belongs to another. Empty where there is none.
 [[nodiscard]] std::string image_fault(std::span<const HeadView> views, const std::map<int, Camera>& cameras);
 
 ALIDADE_PUBLIC_END

@@ -22,9 +22,9 @@ struct DriveMotion {
 };
 
 /// The next piece of a drive's motion towards `goal_rad`, at most `dt_s` of it; returns how long it lasted. The wanted
-/// rate is the largest from which the drive can brake at its acceleration, or what is left over the time constant where
-/// that is less; the rate follows it within the acceleration. A piece has one acceleration, the largest rate or the lag
-/// at the end, in closed form, and does not turn back.
+/// rate is the largest from which the drive can brake at its acceleration, or the remaining angle over the time
+/// constant if less; the rate follows it within the acceleration. A piece has one acceleration, the largest rate or the
+/// lag at the end, in closed form, and does not turn back.
 [[nodiscard]] double advance_drive(const PositionerParams& params, double goal_rad, double dt_s, DriveMotion& motion);
 
 /// The axis in time. A command acts `latency_s` after it was given.
@@ -35,7 +35,7 @@ class Positioner {
   /// Commands in order of time.
   void go_to(double t_s, double target_rad);
   void stop(double t_s);
-  /// Nothing that is on its way acts any more; the drive brakes now.
+  /// Cancels pending commands; the drive brakes now.
   void cut(double t_s);
   /// Moves on to that time; never back.
   void advance(double t_s);

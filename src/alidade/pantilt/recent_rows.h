@@ -6,7 +6,7 @@
 
 #include "alidade/estimation/verdict.h"
 
-// Rows of a stream have no end: the newest are kept, so that memory has one.
+// For streams without end: only the newest rows are kept, so that memory is bounded.
 
 namespace alidade {
 

@@ -46,9 +46,9 @@ std::string fault(const Rig& rig) {
   }
   if (!is_covariance_of(rig.cov_with_lenses, num))
     return "the rig's covariance with its lenses is not of their parameters";
-  if (!rig.lens_courses.empty() && rig.lens_courses.size() != num_heads)
-    return fmt::format("the rig has {} heads, but {} courses of intrinsics are given", num_heads,
-                       rig.lens_courses.size());
+  if (!rig.intrinsics_histories.empty() && rig.intrinsics_histories.size() != num_heads)
+    return fmt::format("the rig has {} heads, but intrinsics over time for {} are given", num_heads,
+                       rig.intrinsics_histories.size());
   return "";
 }
 

@@ -26,8 +26,8 @@ struct Rig {
   /// The same followed by the parameters of all lenses, head by head: what the heads share with the lenses that they
   /// were calibrated through. 0×0 where that is not known; each lens then has its own camera's covariance.
   Eigen::MatrixXd cov_with_lenses;
-  std::vector<EncoderError> encoder_errors;  ///< One per head, or none.
-  std::vector<LensCourse> lens_courses;      ///< One per head, or none: of cameras that zoom.
+  std::vector<EncoderError> encoder_errors;             ///< One per head, or none.
+  std::vector<IntrinsicsHistory> intrinsics_histories;  ///< One per head, or none: of cameras that zoom.
 };
 
 /// What is wrong with a head or a rig that a program made, in one sentence; empty where nothing is.

@@ -6,7 +6,7 @@
 #include "alidade/pantilt/rig.h"
 #include "alidade/public.h"
 
-// What is taken from a rig file is not exact: its errors, in a form that estimators can count.
+// The uncertainty of what a rig file states, in a form that estimators can consider (Schmidt–Kalman).
 
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
@@ -29,12 +29,12 @@ struct RigUncertainty {
 /// and lenses by themselves; σ of zeros and scales of encoders where the rig's covariance holds these.
 [[nodiscard]] Eigen::MatrixXd joint_covariance(const Rig& rig);
 
-/// The errors of a rig whose clocks are right to σ_clock each. Directions that move no pixel are omitted: of what
-/// remains, all but 0.01 px RMS over a working space of 0.5 to 12 m is kept, in at most max_rig_errors directions.
+/// The errors of a rig whose clocks are right to σ_clock each. Directions that move no pixel are omitted: those
+/// kept leave 0.01 px RMS at most over a working space of 0.5 to 12 m, and are at most max_rig_errors.
 [[nodiscard]] RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s = 0.0);
 
-/// ∂ pixel / ∂ u where a head (the one of `factor`) at these readings sees a point that moves so: a clock that lags by
-/// δ shows the target where it is δ later. `lens`: the intrinsics that it is seen under, where these are not its own.
+/// ∂ pixel / ∂ u for the head of `factor` at these readings and a point with that velocity: a clock that lags by δ
+/// shows the target where it is δ later. `lens`: the intrinsics that it is seen under, where these are not its own.
 /// None where the camera does not see it.
 [[nodiscard]] std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, const TurnedHead& turned,
                                                              const Camera& camera,

@@ -15,7 +15,7 @@ ALIDADE_PUBLIC_BEGIN
 
 /// How the rotation of a camera was measured while it rotated.
 enum class RotationSource {
-  none,      ///< Not at all: the pixels must determine it.
+  none,      ///< Not measured: the pixels must determine it.
   rate,      ///< Angular rate, rad/s, in the camera frame.
   head,      ///< Pan and tilt (and roll) of a head, rad; see head_rotation.h.
   attitude,  ///< base_from_cam as a quaternion.

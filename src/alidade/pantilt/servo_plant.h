@@ -49,7 +49,7 @@ struct RatePlant {
 
 using ServoPlant = std::variant<AnglePlant, RatePlant>;
 
-/// One axis of a head: how it moves, where it stops, how late it obeys, and what is not linear in it.
+/// One axis of a head: its plant, stops, command delay and nonlinearities.
 struct ServoAxis {
   ServoPlant plant;
   double min_rad = -std::numeric_limits<double>::infinity();
@@ -61,9 +61,9 @@ struct ServoAxis {
   bool operator==(const ServoAxis&) const = default;
 };
 
-/// What a dead band leaves of a command.
+/// A command after the dead band.
 [[nodiscard]] double past_dead_band(double command, double dead_band);
-/// The axis without dead band, backlash and second lag: what a linear controller knows of it.
+/// The axis without dead band, backlash and second lag: the model of a linear controller.
 [[nodiscard]] ServoAxis linear_part(const ServoAxis& axis);
 
 struct AxisMotion {
@@ -79,21 +79,21 @@ struct AxisMotion {
 [[nodiscard]] double tau_of(const ServoPlant& plant);
 /// Angle (or rate) per unit of command. [rad, rad/s]
 [[nodiscard]] double gain_of(const ServoPlant& plant);
-/// The same plant with gain and time constant multiplied: what it really is where it is not as known.
+/// The same plant with gain and time constant multiplied: the true plant under a model mismatch.
 [[nodiscard]] ServoPlant scaled(const ServoPlant& plant, double gain_factor, double tau_factor);
 
-/// An axis as a whole, whose commands act late: those that are on their way wait in their order. Allocates nothing.
+/// A simulated axis with its command delay: pending commands are queued. Allocates nothing.
 /// Exact but for a second lag, which is stepped through to 10⁻⁴ of it.
 class DelayedAxis {
  public:
   DelayedAxis(const ServoAxis& axis, const AxisMotion& motion) : axis_(axis), motion_(motion), driven_(motion) {}
 
-  /// From now on, after the axis's delay, this command. Of more than 32 on their way the oldest acts at once.
+  /// Queues a command, to act after the axis's delay. Of more than 32 pending ones the oldest acts at once.
   void send(double command);
   /// `added` is added to every command meanwhile.
   void advance(double dt_s, double added = 0.0);
   [[nodiscard]] const AxisMotion& motion() const { return driven_; }
-  /// In the centre of its play, its second lag at rest.
+  /// At that motion, in the centre of its backlash, the second lag settled.
   void set_motion(const AxisMotion& motion) {
     motion_ = driven_ = motion;
     lagged_ = past_dead_band(command_, axis_.dead_band);

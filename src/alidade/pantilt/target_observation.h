@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "alidade/pantilt/head.h"
-#include "alidade/pantilt/lens_course.h"
+#include "alidade/pantilt/intrinsics_history.h"
 #include "alidade/public.h"
 
 namespace alidade {
@@ -34,7 +34,7 @@ struct TargetObservation {
   return observation.sigma_px > 0.0 ? observation.sigma_px : of_all_px;
 }
 
-/// What an observation looks along. None where the lens has no ray there.
+/// The ray of an observation. None where the lens has no ray there.
 [[nodiscard]] std::optional<WorldRay> ray_in_world(const RigHead& rig_head, const TargetObservation& observation);
 
 /// A target's true position at some times, in order of time.
@@ -42,7 +42,7 @@ struct TrueTrack {
   std::vector<double> t_s;
   std::vector<Eigen::Vector3d> position;
 
-  /// Between two times: on the straight line. None before the first and after the last.
+  /// Linear interpolation. None before the first time and after the last.
   [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const;
 };
 

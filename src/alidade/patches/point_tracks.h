@@ -27,7 +27,7 @@ struct TrackedPoint {
   double sigma_px = 0.0;
 };
 
-/// Follows points of a still world through a video, frame by frame. Each is found by frame-to-frame flow, checked
+/// Tracks static points through a video, frame by frame. Each is found by frame-to-frame flow, checked
 /// forward and backward, and then aligned with its patch as first seen, rotated and stretched as needed: errors do not
 /// add up along the video. What is lost is replaced by new points where the image has room.
 class PointTracker {

@@ -14,14 +14,14 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What the first so many shots, in a drawn order, determine of the beam.
+/// σ of the beam from the first `num` shots of a random order.
 struct CountedSigma {
   int num_shots = 0;
   double sigma_origin_m = 0.0, sigma_direction_rad = 0.0;  ///< √trace of the estimate's covariances.
   double bound_origin_m = 0.0, bound_direction_rad = 0.0;  ///< √trace of the Cramér–Rao bound's.
 };
 
-/// A shot as the others predict it; NaN where there is nothing to compare.
+/// A shot predicted from all others (leave-one-out); NaN where there is nothing to compare.
 struct LeftOutShot {
   std::size_t index = 0;
   double residual_range_m = 0.0;  ///< Predicted from its board − read.

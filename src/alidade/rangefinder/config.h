@@ -32,7 +32,7 @@ struct RangefinderConfig {
   std::optional<Board> board = {};  ///< Whose corners the shots have, or that their photos show. None: no board.
   SpotColour spot = SpotColour::automatic;  ///< Of the laser, where spots are looked for in photos.
   bool estimate_scale = false;
-  bool scale_by_need = false;     ///< It is estimated as nobody gave it, not because a person knows that it is off.
+  bool scale_by_need = false;     ///< `scale` was set because no σ of it was given, not by the user.
   bool refine_distortion = true;  ///< With Refine::all: also what of the lens is not fx, fy, cx, cy.
   /// σ of the measurements that do not bring their own. None: estimated from the residuals.
   std::optional<double> sigma_spot_px = {};

@@ -30,15 +30,15 @@ struct EdgesConfig {
 [[nodiscard]] std::vector<std::string> faults(const EdgesConfig& config);
 
 struct EdgesReport {
-  /// Of use is the direction; the origin is known to centimetres. Its covariance counts how parts of the scene differ,
-  /// and that the origin was kept near the initial guess: where it is elsewhere, the direction makes up for it.
+  /// Its direction is of use; the origin is known to centimetres. The covariance includes the scatter between parts of
+  /// the scene, and the prior that keeps the origin near the initial guess, whose error the direction absorbs.
   Beam beam;
   int num_edges = 0;               ///< In the scan.
   double gain = 0.0;               ///< Mean log of the image's edge density at the scan's edges over a uniform one.
   double halves_differ_rad = 0.0;  ///< Direction from one half of the edges against the other's.
 };
 
-/// The answer with what it is worth: never better than care.
+/// The result of rangefinder_by_edges(); its verdict is never better than care.
 struct EdgesCalibration : EdgesReport {
   Camera camera;               ///< As given.
   Eigen::MatrixXd covariance;  ///< Of origin, direction (singular along itself) and scale.

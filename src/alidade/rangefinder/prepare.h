@@ -17,7 +17,7 @@ struct Preparation {
   double min_sigma_range_m = 0.0;  ///< Readings in steps of q scatter by q/√12 at least, whatever their residuals.
 };
 
-/// Where σ is not known and the residuals have not been asked yet: a centroid, a cheap rangefinder.
+/// Initial σ where none is given, before it is estimated from the residuals: a centroid, a cheap rangefinder.
 inline constexpr double guessed_sigma_px = 0.3;
 inline constexpr double guessed_sigma_m = 0.002;
 

@@ -20,11 +20,11 @@ namespace alidade {
                                                       const Camera& camera, const RangefinderConfig& config,
                                                       const Progress& progress = {});
 
-/// What was taken as given, and by how much each could move the answer.
+/// What was taken as given, and the effect of each on the estimate.
 [[nodiscard]] std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report);
 
-/// Does the answer rest on a scale of the readings, or of the board, that is not given? Then it is better estimated: a
-/// board that is too large as a whole moves the origin by its own part only.
+/// Whether the estimate depends on a scale of the readings, or of the board, that is not given. Then it is better
+/// estimated: a board that is too large as a whole moves the origin by its own part only.
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
 
 /// The same of a lens' distortion that its file gives without σ: then it is better estimated, where boards determine
@@ -38,7 +38,7 @@ namespace alidade {
 [[nodiscard]] std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                                           const Camera& camera, const RangefinderConfig& config);
 
-/// What the answer is worth, or why there is none, what to add, and which other method could determine it.
+/// The verdict on the estimate, or why there is none, what to add, and which other method could determine it.
 [[nodiscard]] Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,
                                           const RangefinderConfig& config);
 
@@ -48,8 +48,8 @@ struct SolvedRangefinder {
   RangefinderConfig config;  ///< As it was solved with.
   Camera camera;             ///< The same: with the distortion open where its file gives it without σ.
 };
-/// calibrate_rangefinder() and what a person would do next: the readings' scale is estimated too where the answer rests
-/// on one that is not given and the shots determine it, and where no beam explains the shots the cause is looked for.
+/// calibrate_rangefinder() with automatic next steps: the readings' scale is estimated too where the result depends on
+/// one that is not given and the shots determine it, and where no beam explains the shots the cause is searched for.
 [[nodiscard]] SolvedRangefinder solve_rangefinder(std::span<const Shot> shots,
                                                   std::span<const Eigen::Vector3d> points_in_board,
                                                   const Camera& camera, const RangefinderConfig& config,

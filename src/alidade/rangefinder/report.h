@@ -24,11 +24,11 @@ struct ShotFit {
   Eigen::Vector3d point_in_cam = Eigen::Vector3d::Zero();  ///< Where the beam says the reading was taken.
   std::optional<Plane> plane = {};                         ///< Of the board, in the camera frame.
   std::optional<BoardPose> pose = {};                      ///< Of the board, as solved; where it has one.
-  /// What the shot pulls the answer by, squared, over what its noise lets expect; 1 in the mean if all is as assumed.
+  /// Squared influence of the shot on the estimate over its expectation; 1 in the mean if the noise is as assumed.
   double cluster_z2 = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Something that the solve fixed: what an error of it does to the beam, and what the shots say of it.
+/// Something that the solve fixed: the effect of an error of it on the beam, and its score test.
 struct FixedQuantity {
   std::string name;  ///< scale, square_m, board.flat_m, camera.f, camera.cx, camera.k1, …, sigma_range_m, sigma_spot_px
   double value = 0.0;
@@ -45,7 +45,7 @@ struct ShotCause {
       name;  ///< drift: of the readings over the rows; bend: over their range; wander: of the spots over the rows
   double size = 0.0;  ///< From the first row to the last; of bend, at the ends of the span.
   std::string unit;
-  double sigmas = 0.0;                    ///< By how many σ the residuals ask for it.
+  double sigmas = 0.0;                    ///< By how many σ the residuals indicate it.
   BeamVector moves = BeamVector::Zero();  ///< Of the beam, were it of that size.
 };
 
@@ -55,7 +55,7 @@ struct FreedDistortion {
   double was = 0.0, value = 0.0, sigma = 0.0;
 };
 
-/// What can be known of the beam from these shots, and how its geometry stands.
+/// How well these shots determine the beam, and their geometry.
 struct BeamBound {
   BeamMatrix cov = BeamMatrix::Zero();  ///< Cramér–Rao, lens and poses estimated too; infinite where singular.
   double sigma_origin_m = 0.0;          ///< √trace of the origin's covariance, of the estimate.
@@ -76,22 +76,22 @@ struct RangefinderReport {
     converged,
     too_few,        ///< Shots for the method.
     degenerate,     ///< The information about the beam is singular.
-    scale_unknown,  ///< A scale was asked of spots alone.
+    scale_unknown,  ///< A scale was requested, with spots alone.
     ambiguous,      ///< Two beams explain the shots alike.
     no_convergence
   };
   Status status = Status::too_few;
   Beam beam;                                  ///< Its covariance counts that the measurements of a shot share errors.
   Camera camera;                              ///< As given, or refined with the beam; the beam belongs to it.
-  BeamMatrix cov_model = BeamMatrix::Zero();  ///< Of the beam, if every single measurement erred by itself.
+  BeamMatrix cov_model = BeamMatrix::Zero();  ///< Of the beam, with independent measurements.
   Eigen::MatrixXd lens_cov_model;             ///< The same of a lens that was refined; 0×0: it was fixed.
   ClusterCovariance clusters;                 ///< What separates the two; shots are its clusters.
   std::vector<FixedQuantity> fixed;
   std::vector<ShotCause> causes;
   std::vector<FreedDistortion> freed_distortion;  ///< Empty: the file's holds.
-  bool scale_by_need = false;      ///< The scale was estimated for the beam's sake, it is no result itself.
-  std::vector<Beam> alternatives;  ///< Other beams that fit as well.
-  std::vector<ShotFit> shots;      ///< One per shot.
+  bool scale_by_need = false;                     ///< The scale was estimated as a nuisance parameter, not as a result.
+  std::vector<Beam> alternatives;                 ///< Other beams that fit as well.
+  std::vector<ShotFit> shots;                     ///< One per shot.
   BeamBound bound;
   double sigma_spot_px = 0.0;  ///< Of spots that do not bring their own.
   double sigma_corner_px = 0.0;
@@ -102,7 +102,7 @@ struct RangefinderReport {
   double scale_in_sigmas = 0.0;
   double rms_px = 0.0, rms_range_m = 0.0;  ///< Of the spots (per point) and of the ranges used.
   int shots_used = 0, shots_dropped = 0;
-  int boards_behind = 0;  ///< Flat boards of which the corners run as seen through the paper: mirrored, or numbered so.
+  int boards_behind = 0;  ///< Flat boards seen from behind by their corners' order: mirrored images or numbering.
   int iterations = 0;
 };
 

@@ -27,8 +27,8 @@ struct ShotPlan {
   Verdict verdict;
 };
 
-/// The shots that lower the uncertainty of the beam most, one after the other. Throws ConfigError for a config or a
-/// beam that cannot be.
+/// The shots that lower the uncertainty of the beam most, one after the other. Throws ConfigError for an invalid
+/// config or beam.
 [[nodiscard]] ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config = {}, const Progress& progress = {});
 
 /// What a calibration knows of its beam; a board of 9×6 with squares of 40 mm where it had none.

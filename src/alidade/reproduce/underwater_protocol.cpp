@@ -157,7 +157,7 @@ LocalizationFilterConfig paper_filter() {
   LocalizationFilterConfig config;
   config.is_sequential = config.finds_consensus = config.holds_frame = false;
   config.gate = 1e9;
-  config.bend_tolerance = 0.0;  // always four steps
+  config.curvature_tolerance = 0.0;  // always four steps
   config.state_capacity = 80;
   config.observations_capacity = 16;
   return config;

@@ -43,7 +43,7 @@ void fill_axis(const PositionerFit& fit, const std::string& name, ResultDocument
   estimate["noise"] = fit.noise;
 }
 
-void tell_axis(const PositionerFit& fit, const std::string& name, std::vector<std::string>& lines) {
+void append_axis_lines(const PositionerFit& fit, const std::string& name, std::vector<std::string>& lines) {
   const auto shown = [&fit](const PositionerValue& value, double unit, const char* word) {
     const auto values = fit.values();
     const std::size_t which =
@@ -107,7 +107,7 @@ JobOutcome outcome_of(const HeadIdentification& identified) {
     outcome.files.push_back({name + ".csv", servo_log_csv(servo_samples(identified.logs[i]))});
     if (identified.axes[i].status != PositionerFit::Status::ok) continue;
     fill_axis(identified.axes[i], name, document);
-    tell_axis(identified.axes[i], name, outcome.lines);
+    append_axis_lines(identified.axes[i], name, outcome.lines);
     document.data.push_back(response_table(identified.axes[i], name));
   }
   document.counts.used = document.counts.given;

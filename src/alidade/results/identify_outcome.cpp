@@ -79,7 +79,7 @@ void fill_identification(const Identification& identified, ResultDocument& docum
   fill_response(identified, document);
 }
 
-void tell_plant(const ServoIdentification& identified, std::vector<std::string>& lines) {
+void append_plant_lines(const ServoIdentification& identified, std::vector<std::string>& lines) {
   const ServoFit& fit = identified.fit;
   const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
   const bool is_angle = fit.kind == ServoKind::angle;
@@ -108,7 +108,7 @@ JobOutcome outcome_of(const Identification& identification) {
   outcome.document.verdict = identification.verdict;
   fill_identification(identification, outcome.document);
   if (!is_estimate(static_cast<int>(identification.verdict.exit_code))) return outcome;
-  tell_plant(identification, outcome.lines);
+  append_plant_lines(identification, outcome.lines);
   outcome.files.push_back({"servo.yaml", servo_plant_text(identification.fit)});
   return outcome;
 }

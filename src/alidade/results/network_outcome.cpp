@@ -18,7 +18,7 @@ namespace {
 using Numbers = std::vector<double>;
 constexpr std::size_t max_rows = 4000;  // the page holds them; path.csv has all
 
-JsonValue camera_value(const PlacedCamera& camera) {
+JsonValue camera_value(const LocatedCamera& camera) {
   JsonValue value;
   value["id"] = camera.id;
   value["placed"] = camera.placed;
@@ -143,7 +143,7 @@ std::string path_csv(const MovingTargetReport& report) {
 }
 
 void add_lines_of_camera(const NetworkCalibration& result, std::size_t h, std::vector<std::string>& lines) {
-  const PlacedCamera& camera = result.cameras[h];
+  const LocatedCamera& camera = result.cameras[h];
   const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
   const Eigen::Vector3d& position = result.rig.heads[h].head.world_from_base.translation;
   const HeadVector sigma = 3.0 * result.rig.cov.diagonal().segment<num_head_params>(at).cwiseMax(0.0).cwiseSqrt();
@@ -159,7 +159,7 @@ void add_lines_of_camera(const NetworkCalibration& result, std::size_t h, std::v
 std::vector<std::string> lines_of(const NetworkCalibration& result) {
   std::vector<std::string> lines;
   for (std::size_t h = 0; h < result.cameras.size(); ++h) {
-    const PlacedCamera& camera = result.cameras[h];
+    const LocatedCamera& camera = result.cameras[h];
     if (!camera.placed && !camera.reason.empty())
       lines.push_back(fmt::format("head {}: not located: {}", camera.id, camera.reason));
     if (camera.placed && result.status == MovingTargetReport::Status::placed) add_lines_of_camera(result, h, lines);
@@ -180,12 +180,12 @@ JobOutcome outcome_of(const NetworkCalibration& calibration) {
   document.counts = calibration.counts;
   document.verdict = calibration.verdict;
   JsonValue cameras = JsonValue::list();
-  for (const PlacedCamera& camera : calibration.cameras) cameras.push_back(camera_value(camera));
+  for (const LocatedCamera& camera : calibration.cameras) cameras.push_back(camera_value(camera));
   document.estimate["cameras"] = std::move(cameras);
   if (calibration.status == MovingTargetReport::Status::placed) fill_placed(calibration, document);
   outcome.lines = lines_of(calibration);
   if (!is_estimate(static_cast<int>(calibration.verdict.exit_code))) return outcome;
-  add_rig_files(placed_rig(calibration), outcome.files);
+  add_rig_files(located_rig(calibration), outcome.files);
   outcome.files.push_back({"events.csv", events_csv(observations_on_one_clock(calibration), calibration.rig.heads)});
   outcome.files.push_back({"path.csv", path_csv(calibration)});
   return outcome;

@@ -100,7 +100,7 @@ std::string points_csv(const DataTable& table, std::size_t rows) {
   return text;
 }
 
-void tell_readings(const std::vector<ProjectedReading>& projected, std::vector<std::string>& lines) {
+void append_readings_lines(const std::vector<ProjectedReading>& projected, std::vector<std::string>& lines) {
   for (const ProjectedReading& one : projected) {
     const Eigen::Vector3d& p = one.point.point_in_cam;
     const Eigen::Vector3d sigma = 3.0 * one.point.cov.diagonal().cwiseSqrt();
@@ -136,7 +136,7 @@ void fill_first(const ProjectedReading& first, ResultDocument& document) {
   document.stddev["px"] = std::vector<double>{std::sqrt(first.pixel->cov(0, 0)), std::sqrt(first.pixel->cov(1, 1))};
 }
 
-void tell_matrix(const HeadProjection& head, int number, std::vector<std::string>& lines) {
+void append_matrix_lines(const HeadProjection& head, int number, std::vector<std::string>& lines) {
   const Eigen::Matrix<double, 3, 4>& M = head.M;
   lines.push_back(fmt::format("M{} (head {}, pan {:g} rad, tilt {:g} rad)", number, head.id, head.pan_tilt_rad.x(),
                               head.pan_tilt_rad.y()));
@@ -191,7 +191,7 @@ JobOutcome outcome_of(const BeamProjection& projection) {
   outcome.files.push_back({"points.csv", points_csv(table, projection.readings.size())});
   document.data.push_back(table);
   fill_first(projection.readings.front(), document);
-  tell_readings(projection.readings, outcome.lines);
+  append_readings_lines(projection.readings, outcome.lines);
   const Camera& camera = projection.camera;
   if (projection.beam.cov.isZero(0.0))
     outcome.lines.emplace_back("the beam's file has no covariance: σ is that of the reading alone");
@@ -214,7 +214,7 @@ JobOutcome outcome_of(const RigProjection& projection) {
   for (std::size_t h = 0; h < projection.heads.size(); ++h) {
     const HeadProjection& head = projection.heads[h];
     const int number = static_cast<int>(h) + 1;
-    tell_matrix(head, number, outcome.lines);
+    append_matrix_lines(head, number, outcome.lines);
     document.estimate[fmt::format("M{}", number)] = rows_of(head.M);
     heads.push_back(head_value(head, projection.point_in_world.has_value(), outcome.lines));
   }

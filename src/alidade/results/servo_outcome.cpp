@@ -221,7 +221,7 @@ std::string servo_csv(const ServoScenario& scenario, const ServoStudy& study) {
   return text;
 }
 
-void tell_controllers(const ServoStudy& study, std::vector<std::string>& lines) {
+void append_controllers_lines(const ServoStudy& study, std::vector<std::string>& lines) {
   lines.push_back("controller    RMS px   95 % px   max px   central third   in image");
   for (const ServoComparison& compared : study.comparison) {
     const ServoFigures& figures = compared.figures;
@@ -235,7 +235,7 @@ void tell_controllers(const ServoStudy& study, std::vector<std::string>& lines) 
 }
 
 /// The best controller by the intrinsics that its loop goes by.
-void tell_lenses(const ServoStudy& study, std::vector<std::string>& lines) {
+void append_lenses_lines(const ServoStudy& study, std::vector<std::string>& lines) {
   if (study.lenses.empty()) return;
   lines.push_back(fmt::format("intrinsics    RMS px   95 % px   max px   in image   fx off by   ({})",
                               controller_name(study.best)));
@@ -259,8 +259,8 @@ JobOutcome outcome_of(const ServoResult& result) {
   outcome.document.assumed = result.assumed;
   outcome.document.verdict = result.verdict;
   fill_servo(result.scenario, result, outcome.document);
-  tell_controllers(result, outcome.lines);
-  tell_lenses(result, outcome.lines);
+  append_controllers_lines(result, outcome.lines);
+  append_lenses_lines(result, outcome.lines);
   if (is_estimate(static_cast<int>(result.verdict.exit_code)))
     outcome.files.push_back({"servo.csv", servo_csv(result.scenario, result)});
   return outcome;

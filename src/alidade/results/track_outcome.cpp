@@ -16,9 +16,9 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-/// Of each head: how many, their mean, mean along the motion, slope over the image and colour, in σ of each.
+/// Of each head: how many, their mean, mean along the motion, slope over the image and autocorrelation, in σ of each.
 DataTable innovations_table(std::span<const RigHead> heads, const TrackReport& report) {
-  Numbers head, num, mean_u, mean_v, along, place_u, place_v, colour, nis;
+  Numbers head, num, mean_u, mean_v, along, place_u, place_v, autocorrelation, nis;
   for (std::size_t h = 0; h < report.innovations.size(); ++h) {
     const HeadInnovations& of = report.innovations[h];
     head.push_back(heads[h].head.id);
@@ -26,9 +26,9 @@ DataTable innovations_table(std::span<const RigHead> heads, const TrackReport& r
     mean_u.push_back(of.mean.x());
     mean_v.push_back(of.mean.y());
     along.push_back(of.along);
-    place_u.push_back(of.place.x());
-    place_v.push_back(of.place.y());
-    colour.push_back(of.colour);
+    place_u.push_back(of.position_slope.x());
+    place_v.push_back(of.position_slope.y());
+    autocorrelation.push_back(of.autocorrelation);
     nis.push_back(of.nis_per_dof);
   }
   DataTable table{"innovations", {{"head", head}, {"num", num}}};
@@ -37,7 +37,7 @@ DataTable innovations_table(std::span<const RigHead> heads, const TrackReport& r
   table.columns.emplace_back("along_motion_sigma", rounded(std::move(along), 4));
   table.columns.emplace_back("slope_u_sigma", rounded(std::move(place_u), 4));
   table.columns.emplace_back("slope_v_sigma", rounded(std::move(place_v), 4));
-  table.columns.emplace_back("colour", rounded(std::move(colour), 4));
+  table.columns.emplace_back("colour", rounded(std::move(autocorrelation), 4));
   table.columns.emplace_back("nis_per_dof", rounded(std::move(nis), 4));
   return table;
 }
@@ -113,7 +113,7 @@ void fill_target_frames(std::span<const TargetFrame> frames, std::span<const Rig
   document.data.push_back(std::move(table));
 }
 
-void tell_track(const TrackReport& report, std::vector<std::string>& lines) {
+void append_track_lines(const TrackReport& report, std::vector<std::string>& lines) {
   if (report.steps.empty() || !report.steps.back().has_belief) return;
   const TrackStep& last = report.steps.back();
   const std::array<const char*, 3> axes{"x", "y", "z"};
@@ -142,7 +142,7 @@ void add_track(const TargetTrack& track, JobOutcome& outcome) {
   document.counts = track.counts;
   document.assumed = track.assumed;
   fill_track(track, document);
-  tell_track(track, outcome.lines);
+  append_track_lines(track, outcome.lines);
   if (!is_estimate(static_cast<int>(track.verdict.exit_code))) return;
   outcome.files.push_back({"track.csv", track_csv(track.steps, track.ahead)});
   if (!track.smoothed.empty()) outcome.files.push_back({"smoothed.csv", smoothed_csv(track.smoothed)});

@@ -10,8 +10,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Everything that a calibration of a rig has to say: what the solve found (rig, boards, views …), and what it is
-/// worth.
+/// The result of rig(): what the solve found (rig, boards, views …), with its covariance, counts and
+/// verdict.
 struct RigCalibration : RigReport {
   std::vector<HeadView> measured;        ///< With the corners found in their photos; `views` says what became of each.
   std::vector<SkippedInput> no_board;    ///< Photos that show no board, or cannot be used; in `counts.skipped`, too.

@@ -20,9 +20,8 @@ struct HeadViewFit {
   std::string reason;   ///< Why it was not used; empty otherwise.
   double chi2 = 0.0;    ///< Corners and reading, against the rig as solved; also of a view that was rejected.
   double rms_px = 0.0;  ///< Per point.
-  Eigen::Vector2d reading_correction_rad =
-      Eigen::Vector2d::Zero();               ///< What the rig would rather have read, less read.
-  std::vector<Eigen::Vector2d> residual_px;  ///< Prediction − observation, one per corner.
+  Eigen::Vector2d reading_correction_rad = Eigen::Vector2d::Zero();  ///< Estimated reading minus actual reading.
+  std::vector<Eigen::Vector2d> residual_px;                          ///< Prediction − observation, one per corner.
   double cluster_z2 = 0.0;  ///< Its squared influence on the rig over that of its noise alone; 0: unused.
 };
 
@@ -34,12 +33,12 @@ struct RigBoard {
 
 /// Beyond so many σ a cause is indicated: of thirty that are tested, one clean rig in a thousand is above.
 inline constexpr double rig_cause_limit = 4.2;
-/// What is estimated by need costs σ where it was not needed, and no more: one clean rig in seven.
+/// A parameter freed without need only costs σ: so a lower threshold, exceeded by one clean rig in seven.
 inline constexpr double rig_free_limit = 2.6, rig_free_joint_limit = 2.6;
 
-/// A head that rotated less about an axis is taken not to have rotated about it.
+/// A rotation about an axis below this counts as none. [rad]
 inline constexpr double min_span_rad = 0.07;
-/// Over so much of each axis, 20°, a rig is to be known.
+/// Range of each axis, 20°, over which σ of the rig is assessed. [rad]
 inline constexpr double good_span_rad = 0.35;
 
 /// What the views of one head cover.
@@ -50,7 +49,7 @@ struct HeadCover {
   int num_shared_boards = 0;  ///< Seen by another head, too.
 };
 
-/// Something that the residuals ask to be free, by how many σ, and how large it would be.
+/// A parameter that the residuals indicate to be free: by how many σ, and its value (a score test).
 struct RigCause {
   std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn", "all scales"
   double size = 0.0;
@@ -84,8 +83,8 @@ struct RigReport {
   Status status = Status::too_few;
   Rig rig;  ///< World: the first head's camera at readings of zero. Covariance: views are clusters, and what is given
             ///< with a σ is included.
-  Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
-  ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
+  Eigen::MatrixXd cov_model;                        ///< As rig.cov, with independent errors and everything given exact.
+  ClusterCovariance clusters;                       ///< Views; of the parameters that are solved for.
   std::vector<Assumption> assumed;                  ///< Lenses, the square, the encoders' scales.
   std::vector<RigCause> causes;                     ///< Tested one by one, the most significant first.
   std::vector<RigFreed> freed;                      ///< By need.
@@ -97,7 +96,7 @@ struct RigReport {
   std::vector<HeadViewFit> views;    ///< One per view.
   std::vector<HeadCover> covers;     ///< One per head.
   int mirrored_head = 0;             ///< Its id, where one is.
-  std::string misreading;            ///< With which change of the readings the views agree; empty: none is needed.
+  std::string misreading;            ///< The change of the readings that makes the views agree; empty: none is needed.
   std::vector<std::string> unknown;  ///< Parameters of the combination that is unobservable.
   double sigma_px = 0.0, sigma_encoder_rad = 0.0;
   bool sigma_px_is_estimated = false, sigma_encoder_is_estimated = false;  ///< From the residuals.

@@ -22,7 +22,7 @@ namespace alidade {
                                               const std::map<int, Camera>& cameras, const RigConfig& config,
                                               const Progress& progress = {});
 
-/// What the answer is worth, or why there is none, and what to add.
+/// The verdict on the estimate, or why there is none, and what to add.
 [[nodiscard]] Verdict rig_verdict(const RigReport& report, const RigConfig& config);
 
 /// Covariance (translation, rotation; on the right) of cam_from_cam(first, second) of two heads at these readings, by

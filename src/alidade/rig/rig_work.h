@@ -41,7 +41,7 @@ struct Work {
                                       const std::map<int, Camera>& cameras, const RigConfig& config,
                                       const Progress& progress);
 
-/// Heads and boards by index; views without a camera or corners of the board are named and left aside.
+/// Heads and boards by index; views without a camera or corners of the board are named and rejected.
 void index_views(Work& work, const std::map<int, Camera>& cameras);
 /// The pose of the board of each view by itself, and with them σ of a corner.
 void fit_poses(Work& work);

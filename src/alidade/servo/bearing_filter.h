@@ -12,8 +12,8 @@ ALIDADE_PUBLIC_BEGIN
 
 inline constexpr std::size_t num_agilities = 5;
 
-/// A target's bearing from a head, one axis: angle, rate, acceleration; each of a few Singer models knows
-/// another manoeuvre of the target, and their past predictions decide how much each is heard.
+/// A target's bearing from a head, one axis: angle, rate, acceleration; a few Singer models with different manoeuvre
+/// intensities, weighted by the likelihood of their past predictions.
 struct BearingFilterConfig {
   double singer_tau_s = 0.4;  ///< For how long an acceleration lasts.
   /// σ of the target's angular acceleration: 5, 20, 80, 320 and 1280 °/s². One alone: all of them the same.
@@ -49,7 +49,7 @@ class BearingAxis {
   void update(double t_s, double angle_rad, double variance_rad2, const LensEffect& effect = LensEffect::Zero());
   /// The mixture at a time not before the last observation.
   [[nodiscard]] Bearing at(double t_s) const;
-  /// How much each model is heard.
+  /// Weights of the models.
   [[nodiscard]] const std::array<double, num_agilities>& weights() const { return weights_; }
 
  private:

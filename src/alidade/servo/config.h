@@ -18,11 +18,11 @@ inline constexpr std::array controller_kinds{ControllerKind::pi, ControllerKind:
 [[nodiscard]] std::string_view controller_name(ControllerKind kind);  ///< pi, feedforward, lqr, mpc
 [[nodiscard]] std::optional<ControllerKind> controller_named(std::string_view name);
 
-/// What a controller is about at one step.
+/// Mode of a controller at one step.
 enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, found };
 [[nodiscard]] std::string_view servo_event_name(ServoEvent event);
 
-/// What to do where the target is not seen: first go on as it went, then look round where it should be.
+/// When the target is not seen: first coast along its predicted path, then search around the prediction in a spiral.
 struct SearchConfig {
   bool enabled = true;
   double coast_s = 0.3;         ///< Without an observation for so long the target counts as lost.

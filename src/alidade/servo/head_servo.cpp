@@ -44,7 +44,7 @@ std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadObservation& obse
 std::array<LensEffect, 2> HeadServo::lens_effects(const HeadObservation& observation) const {
   std::array<LensEffect, 2> effects{LensEffect::Zero(), LensEffect::Zero()};
   if (!observation.lens) return effects;
-  const LensNow& lens = *observation.lens;
+  const IntrinsicsSample& lens = *observation.lens;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const double f = lens.k[axis], offset = (observation.px[axis] - lens.k[2 + axis]) / f;
     effects[static_cast<std::size_t>(axis)] = {offset * lens.sigma[axis] / f, lens.sigma[2 + axis] / f};

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "alidade/pantilt/head.h"
-#include "alidade/pantilt/lens_course.h"
+#include "alidade/pantilt/intrinsics_history.h"
 #include "alidade/servo/axis/axis_controller.h"
 #include "alidade/servo/identify/search.h"
 
@@ -17,7 +17,7 @@ struct HeadObservation {
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   /// Intrinsics of that image, where they are not the head's own; their σ is included.
-  std::optional<LensNow> lens = {};
+  std::optional<IntrinsicsSample> lens = {};
 };
 
 struct HeadServoInput {

@@ -36,7 +36,7 @@ inline constexpr std::array<const char*, num_servo_params> servo_param_names{"ga
 /// acceleration an angle plant is the axis of a head that takes position commands: docs/maths/servo.md.
 enum class ServoKind { angle, rate };
 
-/// What a servo can do beside a first-order lag, each of some size; 0: nothing of it.
+/// Nonlinearities of a servo beside its first-order lag; 0: absent.
 struct ServoFlaws {
   double max_rate_rad_s = 0.0, max_acceleration_rad_s2 = 0.0;
   double dead_band = 0.0;     ///< Commands smaller than it do nothing, larger ones count from it.
@@ -74,7 +74,7 @@ struct ServoFit {
   bool is_observable = false;  ///< The normal equations can be solved.
 };
 
-/// A flaw that another one of the model explains as well.
+/// A flaw that cannot be distinguished from another one of the model.
 struct ServoRival {
   std::size_t flaw = 0, other = 0;
   double evidence = 0.0;  ///< 2 ln of the likelihood ratio, for `flaw`.
@@ -121,7 +121,7 @@ struct IdentifyConfig {
 /// The fields of `config` that a user sets.
 [[nodiscard]] FieldList fields_of(IdentifyConfig& config);
 
-/// Everything that identify() has to say: the plant of one axis with its covariance (`fit`), and what it is worth.
+/// The result of identify(): the plant of one axis with its covariance (`fit`), and its verdict.
 struct Identification : ServoIdentification {
   std::vector<ServoSample> log;
   IdentifyConfig config;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "alidade/pantilt/lens_course.h"
+#include "alidade/pantilt/intrinsics_history.h"
 #include "alidade/simulate/track.h"
 
 namespace alidade {

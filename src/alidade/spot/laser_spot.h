@@ -23,7 +23,7 @@ enum class SpotColour { automatic, red, green, bright };
 struct LaserSpotConfig {
   SpotColour colour = SpotColour::automatic;
   double min_snr = 8.0;         ///< Of the spot's peak, smoothed: noise reaches 6 once in ten thousand photos.
-  double max_radius_px = 40.0;  ///< What is wider is a coloured thing.
+  double max_radius_px = 40.0;  ///< Wider ones are coloured objects, not spots.
   double rival_share = 0.2;     ///< A second spot with this share of the first one's light is a rival.
 };
 

@@ -334,7 +334,7 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
   if (top.has("rig")) {
     read.rig = file.parent_path() / top.text("rig");
     const Rig rig = read_rig(read.rig);
-    if (!rig.lens_courses.empty())
+    if (!rig.intrinsics_histories.empty())
       refuse(read.rig.string(), "intrinsics", "is for `alidade track`; a scenario says `zoom` and `intrinsics` itself");
     read.scenario.scene.heads = rig.heads;
     read.scenario.scene.rig_errors = rig_uncertainty(rig);

@@ -11,7 +11,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// How the target is taken to move: with constant velocity, by Singer's model, in a coordinated turn, by interacting
+/// Motion model of the target: constant velocity, by Singer's model, in a coordinated turn, by interacting
 /// models (quiet, agile or falling), in free fall; or the filter of Xiahou, Chen & Wu, 2015, for two heads.
 enum class TrackMethod { cv, singer, turn, imm, ballistic, xiahou2015 };
 

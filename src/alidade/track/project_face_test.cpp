@@ -85,7 +85,7 @@ TEST(ProjectFace, AnswersEveryMisuse) {
   EXPECT_THROW((void)project_rig(two_heads(), {}, {0.0}), ConfigError);
   EXPECT_THROW((void)project_rig(two_heads(), {0.0, 0.0, 0.0}, {0.0}), ConfigError);
   Rig zooming = two_heads();
-  zooming.lens_courses.resize(2);
+  zooming.intrinsics_histories.resize(2);
   EXPECT_THROW((void)project_rig(zooming, {0.0}, {0.0}), ConfigError);
   EXPECT_THROW((void)project_rig(Rig{}, {0.0}, {0.0}), ConfigError);
 }

@@ -156,16 +156,16 @@ double mean_nis(const std::vector<TrackStep>& steps, const std::vector<bool>& co
 
 /// What the innovations ask σ² to be raised by: where they are larger than stated, or follow one another.
 double asked_inflation(const TrackReport& report) {
-  constexpr double min_nis = 0.2, in_sigma = 3.5, max_colour = 0.35;
-  double colour = 0.0, num = 0.0;
+  constexpr double min_nis = 0.2, in_sigma = 3.5, max_correlation = 0.35;
+  double correlated = 0.0, num = 0.0;
   for (const HeadInnovations& head : report.innovations) {
-    colour += static_cast<double>(head.num) * head.colour;
+    correlated += static_cast<double>(head.num) * head.autocorrelation;
     num += static_cast<double>(head.num);
   }
   // Of n observations the mean NIS a degree of freedom scatters by 1/√n.
   const double max_nis = 1.0 + std::max(min_nis, in_sigma / std::sqrt(std::max(1.0, num)));
   double inflation = report.nis_per_dof > max_nis ? report.nis_per_dof : 1.0;
-  if (num > 0.0 && colour / num > max_colour) inflation *= (num + colour) / (num - colour);
+  if (num > 0.0 && correlated / num > max_correlation) inflation *= (num + correlated) / (num - correlated);
   return inflation;
 }
 

@@ -24,19 +24,20 @@ struct PredictedStep {
   Belief<6> belief;
 };
 
-/// What the innovations of one head show, each scaled to σ = 1: if the model is correct they are white, with mean zero
-/// wherever the target is and however it moves. Those rejected by the gate count, at the gate.
+/// Statistics of one head's whitened innovations: with a correct model they are white, with mean zero wherever the
+/// target is and however it moves. Those rejected by the gate count, scaled to the gate.
 struct HeadInnovations {
   std::size_t num = 0;
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();   ///< In u, v.
-  double along = 0.0;                               ///< Mean along the target's motion in the image.
-  Eigen::Vector2d place = Eigen::Vector2d::Zero();  ///< Slope over (u, v) − centre, a quarter of the image the unit.
-  double place_num = 0.0;                           ///< Σ x² behind the slope: its σ is 1/√ of it.
-  double colour = 0.0;                              ///< Correlation with the one before.
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();  ///< In u, v.
+  double along = 0.0;                              ///< Mean along the target's motion in the image.
+  Eigen::Vector2d position_slope =
+      Eigen::Vector2d::Zero();    ///< Slope over (u, v) − centre, a quarter of the image the unit.
+  double position_squares = 0.0;  ///< Σ x² behind the slope: its σ is 1/√ of it.
+  double autocorrelation = 0.0;   ///< Correlation with the one before.
   double nis_per_dof = 0.0;
 };
 
-/// What the observations of a track say of one number that the rig file states.
+/// A parameter of the rig file that the observations contradict.
 struct RigFault {
   std::string name;  ///< "head2.base_rx_rad", "head1.tilt_scale", "head2.camera.fy".
   double off = 0.0;  ///< By how much it seems off, in its unit.
@@ -71,14 +72,14 @@ struct TrackReport {
   bool errors_are_counted = false;  ///< Those of the rig.
 };
 
-/// Is shown each observation with what became of it, as it is followed. What it throws ends the work.
+/// Called with each observation and what became of it. What it throws ends the work.
 using TrackWatch = std::function<void(const TargetObservation&, const TrackStep&)>;
 
-/// Everything that track() has to say: the path with its covariances (`steps`, and `ahead` and `smoothed` where they
-/// were asked for), and what it is worth.
+/// The result of track(): the path with its covariances (`steps`, and `ahead` and `smoothed` where they were
+/// requested), and its verdict.
 struct TargetTrack : TrackReport {
-  Rig rig;                                      ///< As used: the lenses' σ are those of their courses.
-  std::vector<TargetObservation> observations;  ///< As used, one per step; of a course each has its lens.
+  Rig rig;                                      ///< As used: with the σ of the intrinsics histories.
+  std::vector<TargetObservation> observations;  ///< As used, one per step; with its lens where the rig has a history.
   TrueTrack truth;
   TrackConfig config;
   std::vector<Assumption> assumed;

@@ -31,7 +31,7 @@ struct TrackerConfig {
   IteratedUpdateConfig update;
   double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a right observation fails it once in 270 000.
   double min_depth_m = 0.2, max_depth_m = 20.0;  ///< The rig's working range, along a camera's view.
-  int restart_after = 2;  ///< Rejections one after the other, of one head: then it is asked whether another track fits.
+  int restart_after = 2;       ///< Rejections one after the other, of one head: then a new track is tried.
   double together_s = 0.06;    ///< Two heads that far apart in time still intersect.
   double start_sigma_m = 1.0;  ///< Or a tenth of the distance, where that is more.
   double start_sigma_v_m_s = 2.0;

@@ -17,7 +17,7 @@ struct FittingModel {
 };
 
 /// The lens model that fits these corners, each tried in turn: RMS at most half of the failed solve's, nearly all
-/// corners in use. For a solve of `config` that did not settle, or whose parameters are undetermined because it does
+/// corners in use. For a solve of `config` that did not converge, or whose parameters are undetermined because it does
 /// not fit. None where no other fits either: then the corners, or the board, are to be doubted.
 [[nodiscard]] std::optional<FittingModel> fitting_model(const Board& board, std::span<const BoardView> views,
                                                         ImageSize size, const CalibrateConfig& config,

@@ -9,14 +9,14 @@
 
 namespace alidade {
 
-/// What a calibration is worth, in one sentence and its checks: coverage, lens adequate, consistent, honest corners,
+/// The verdict on a calibration, one sentence and its checks: coverage, lens adequate, consistent, honest corners,
 /// board flat, principal point. Every number in the text is read off `study` and `report`. Corners that bring no
 /// covariance are judged by their tails alone.
 [[nodiscard]] Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStudy& study,
                                           std::span<const BoardView> views, const CalibrateConfig& config,
                                           const NextPhotoPlan& next);
 
-/// The verdict of a calibration that was refused or did not settle: exit code 4 or 5, what cannot be determined, what
+/// The verdict on a calibration that was refused or did not converge: exit code 4 or 5, what cannot be determined, what
 /// to add.
 [[nodiscard]] Verdict refusal_verdict(const CalibrateReport& report);
 

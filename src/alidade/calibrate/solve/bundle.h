@@ -63,8 +63,8 @@ struct BundleResult {
 /// 2000, §6; gauge of the free board: minimal constraints, the rigid motion and scale that fit the printed board best.
 [[nodiscard]] BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config);
 
-/// The same; where a Brown lens' fold bars the way (a step that puts one corner behind it is refused, and the solve
-/// creeps along the fold), it goes on by the formulas alone, as others always do. Status no_convergence where it ends
+/// The same; where a Brown lens' fold stops it (a step that puts one corner behind it is refused, and the solve creeps
+/// along the fold), it continues with the polynomial beyond it, as OpenCV does. Status no_convergence where it ends
 /// with a corner that counts behind the fold; with more than a tenth of them there, the first result is kept.
 [[nodiscard]] BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config);
 

@@ -17,7 +17,7 @@ namespace alidade {
                                                         double noise_variance, std::span<const BoardView> views,
                                                         int width_px);
 
-/// Where solves from these starts settle, other than at `found`: each minimum once, the least cost first.
+/// The minima to which solves from these initial guesses converge, other than `found`: each once, lowest cost first.
 [[nodiscard]] std::vector<BundleResult> other_minima(const BundleProblem& problem, const BundleResult& found,
                                                      const std::vector<BundleState>& starts,
                                                      const BundleConfig& config);

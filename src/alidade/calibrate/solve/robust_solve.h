@@ -12,13 +12,13 @@ namespace alidade {
 struct CalibrationWork {
   std::vector<std::size_t> number;  ///< Position of each in the caller's views.
   std::vector<BoardView> views;
-  std::vector<std::vector<bool>> far;  ///< Corners that take no part in the start.
+  std::vector<std::vector<bool>> far;  ///< Corners that are not used for the initial guess.
   std::vector<ViewArrays> arrays;
   BundleProblem problem;
   bool use_covariances = false;
 };
 
-/// Takes a view out; the report says why.
+/// Rejects a view; the report says why.
 void drop_view(std::size_t at, const std::string& reason, CalibrateReport& report, CalibrationWork& work,
                BundleState& state);
 

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// What each view alone does to the free lens parameters, its pose eliminated, the board's shape taken along: the
+/// The influence of each view on the free lens parameters, its pose eliminated, the board's shape estimated: the
 /// clusters of their covariance, for whitened_cluster_covariance(). `result` must have its covariance, of which L Lᵀ is
 /// the free lens parameters' block; views without a pose stand as zeros.
 [[nodiscard]] std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result,

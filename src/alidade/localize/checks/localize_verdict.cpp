@@ -172,16 +172,16 @@ void add_residuals(const Localization& report, Verdict& verdict) {
   if (!report.is_smoothed) return;
   const ResidualStructure& residuals = report.residuals;
   constexpr double care_px_share = 0.2;  // of σ: less is seen in long recordings and moves nothing
-  if (residuals.place_chi2 > 2.0 * residuals.place_limit && residuals.worst_px > care_px_share * report.sigma_px)
+  if (residuals.mean_chi2 > 2.0 * residuals.mean_chi2_limit && residuals.worst_px > care_px_share * report.sigma_px)
     verdict.checks.push_back({"position in the image", State::care,
                               "residuals depend on the position in the image, " + text_of(residuals.worst_px, 2) +
-                                  " px in the " + residuals.worst_place + ": the lens is not as given",
-                              residuals.place_chi2, 2.0 * residuals.place_limit, "1", "nis"});
-  if (residuals.has_colour())
+                                  " px in the " + residuals.worst_region + ": the lens is not as given",
+                              residuals.mean_chi2, 2.0 * residuals.mean_chi2_limit, "1", "nis"});
+  if (residuals.is_autocorrelated())
     verdict.checks.push_back({"colour", State::care,
-                              "errors last from frame to frame (correlation " + text_of(residuals.colour, 2) +
+                              "errors last from frame to frame (correlation " + text_of(residuals.autocorrelation, 2) +
                                   "): the path is solved with that",
-                              residuals.colour, 0.25, "1", "nis"});
+                              residuals.autocorrelation, 0.25, "1", "nis"});
 }
 
 /// A filter over hundreds of frames is surer than it may be.

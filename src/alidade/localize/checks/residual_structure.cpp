@@ -51,7 +51,7 @@ std::string name_of(std::size_t part) {
 }
 
 /// Correlation of what neighbours in time have, of the same point.
-void add_colour(std::span<const PlacedResidual> residuals, ResidualStructure& structure) {
+void add_autocorrelation(std::span<const PlacedResidual> residuals, ResidualStructure& structure) {
   std::map<long, const PlacedResidual*> last;
   double products = 0.0, squares = 0.0, num = 0.0;
   for (const PlacedResidual& residual : residuals) {
@@ -65,15 +65,15 @@ void add_colour(std::span<const PlacedResidual> residuals, ResidualStructure& st
     before = &residual;
   }
   if (!(squares > 0.0)) return;
-  structure.colour = products / squares;
-  structure.sigma_colour = 1.0 / std::sqrt(num);
+  structure.autocorrelation = products / squares;
+  structure.sigma_autocorrelation = 1.0 / std::sqrt(num);
 }
 
 }  // namespace
 
 ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, const Camera& camera) {
   ResidualStructure structure;
-  add_colour(residuals, structure);
+  add_autocorrelation(residuals, structure);
   std::array<ImagePart, num_across * num_down> parts;
   for (const PlacedResidual& residual : residuals) {
     const auto index = [](double share, std::size_t num) {
@@ -85,22 +85,22 @@ ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, 
     part.v.add(residual.id, residual.residual_px.y() / residual.sigma_px, residual.residual_px.y());
   }
   constexpr double least = 30.0;
-  const bool lasts = structure.has_colour();
+  const bool lasts = structure.is_autocorrelated();
   double num = 0.0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (!parts[i].u.has_enough(least, lasts)) continue;
     num += 2.0;
-    structure.place_chi2 += parts[i].u.chi2(lasts) + parts[i].v.chi2(lasts);
+    structure.mean_chi2 += parts[i].u.chi2(lasts) + parts[i].v.chi2(lasts);
     const double mean_px = std::hypot(parts[i].u.mean_px(), parts[i].v.mean_px());
     if (!(mean_px > structure.worst_px)) continue;
     structure.worst_px = mean_px;
-    structure.worst_place = name_of(i);
+    structure.worst_region = name_of(i);
   }
   if (!(num > 0.0)) return structure;
-  structure.place_chi2 /= num;
+  structure.mean_chi2 /= num;
   constexpr double z = 3.09;  // of a χ² by Wilson & Hilferty 1931
   const double w = 2.0 / (9.0 * num);
-  structure.place_limit = std::pow(1.0 - w + z * std::sqrt(w), 3);
+  structure.mean_chi2_limit = std::pow(1.0 - w + z * std::sqrt(w), 3);
   return structure;
 }
 

@@ -21,7 +21,7 @@ enum class ObservationOutcome {
   not_visible,  ///< The lens does not see the feature from here.
 };
 
-/// Where a feature is expected, and how surely: search its 3σ ellipse.
+/// Predicted pixel of a feature with its covariance: search its 3σ ellipse.
 struct ExpectedObservation {
   Eigen::Vector2d px;
   Eigen::Matrix2d S;  ///< Covariance of the innovation, with the pixel's own noise. [px²]
@@ -64,7 +64,7 @@ class LocalizationFilter {
   [[nodiscard]] bool has_room(int count) const { return P_.dim() + count <= config_.state_capacity; }
   /// Inverse depths that are nearly linear become positions: half the components. Their count.
   int convert_linear();
-  /// The camera is elsewhere: correlations with the map end, the map stays.
+  /// Relocalisation: the camera's correlations with the map are dropped, the map is kept.
   void place_camera(const CameraMotion& motion, const MotionMatrix& cov);
 
   /// Where a feature of the map should be seen now. None: not in the map, or not visible.
@@ -86,7 +86,7 @@ class LocalizationFilter {
   [[nodiscard]] const Camera& camera() const { return camera_; }
   /// σ of the lens's parameters that are in the state, in the order of the configuration.
   [[nodiscard]] Eigen::VectorXd lens_sigmas() const;
-  /// What is taken as given: how the state moves with it, and what the observations say of it.
+  /// What is taken as given: sensitivity of the state to it, and its score test.
   [[nodiscard]] const GivenEffects& given() const { return given_; }
   /// How the pose's right perturbation moves with each given number.
   [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_given() const;
@@ -189,7 +189,7 @@ class LocalizationFilter {
   static constexpr std::size_t max_in_group = StateCovariance::max_columns / 2;
   std::array<Measured, max_in_group> there_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
-  bool turns_world_ = false;     ///< Whether the errors of this update are those of world_turn.h.
+  bool turns_world_ = false;     ///< Whether the errors of this update are those of world_rotation.h.
   ScaleReading scale_;           ///< Of the state before the update,
   std::optional<int> scale_at_;  ///< and its component while the update goes on.
   Camera camera_at_delta_;

@@ -7,18 +7,18 @@
 
 namespace alidade {
 
-/// One belief of where the camera starts and how it moves; `cost` is −2 ln of its weight.
+/// One hypothesis of the initial pose and motion; `cost` is −2 ln of its weight.
 struct StartHypothesis {
   CameraMotion motion;
   MotionMatrix cov = MotionMatrix::Zero();
   double cost = 0.0;
 };
 
-/// Filters that start differently, until the observations show which is right. In front of a small or flat target, a
-/// sideways translation and rotation look alike: the first frames leave a long curved valley of poses, a Gaussian on it
-/// is sure of itself in the wrong position, and one in ten runs is lost. So the belief of the speed aside is split into
+/// Filters with different initial guesses, until the observations decide. In front of a small or flat target, a
+/// sideways translation and rotation look alike: the posterior of the first frames is a long curved valley, a Gaussian
+/// fitted to it is overconfident, and one in ten runs diverges. So the prior of the sideways speed is split into
 /// narrower ones (a Gaussian sum; D. L. Alspach & H. W. Sorenson, "Nonlinear Bayesian Estimation Using Gaussian Sum
-/// Approximations", IEEE TAC 17(4), 1972), each weighed by what it said of the observations. The two poses of a flat
+/// Approximations", IEEE TAC 17(4), 1972), each weighted by its likelihood. The two poses of a flat
 /// target are two starts.
 class FilterBank {
  public:

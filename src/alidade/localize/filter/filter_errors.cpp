@@ -1,9 +1,9 @@
 #include <cmath>
 
 #include "alidade/localize/filter/filter.h"
-#include "alidade/localize/filter/world_turn.h"
+#include "alidade/localize/filter/world_rotation.h"
 
-// What an error of the state is: what is seen of it, and how the state moves by one. See world_turn.h.
+// What an error of the state is: what is seen of it, and how the state moves by one. See world_rotation.h.
 
 namespace alidade {
 namespace {
@@ -19,9 +19,9 @@ bool LocalizationFilter::linearise(Measured& measured) {
   Rigid3 world_from_cam = motion_.world_from_cam;
   const Feature& nominal = *measured.feature;
   Feature feature = nominal;
-  const WorldTurn turn(world_from_cam, phi);
+  const WorldRotation turn(world_from_cam, phi);
   if (turns_world_) {  // the camera keeps its attitude: nothing measured depends on how the world is rotated
-    world_from_cam.translation = turn.place_before(world_from_cam.translation, delta_.head<3>());
+    world_from_cam.translation = turn.position_before(world_from_cam.translation, delta_.head<3>());
     feature = turn.feature_before(nominal, error_of(nominal));
   } else {
     world_from_cam.translation += delta_.head<3>();
@@ -42,7 +42,7 @@ bool LocalizationFilter::linearise(Measured& measured) {
   Eigen::Matrix<double, 2, 3> J_rotation;
   if (turns_world_) {
     J_rotation = (view->J_px_pose.leftCols<3>() * cross_matrix(motion_.world_from_cam.translation) +
-                  view->J_px_feature * J_before_turn(nominal)) *
+                  view->J_px_feature * J_before_rotation(nominal)) *
                  turn.world_from_cam();
   } else {
     const Eigen::Matrix3d J = right_jacobian(phi);
@@ -51,7 +51,7 @@ bool LocalizationFilter::linearise(Measured& measured) {
       const Eigen::Matrix3d R = turn.world_from_cam(), RJ = R * J.transpose();
       J_rotation += view->J_px_pose.leftCols<3>() * (cross_matrix(motion_.world_from_cam.translation) * R -
                                                      cross_matrix(world_from_cam.translation) * RJ);
-      J_rotation += view->J_px_feature * (J_before_turn(nominal) * R - J_before_turn(feature) * RJ);
+      J_rotation += view->J_px_feature * (J_before_rotation(nominal) * R - J_before_rotation(feature) * RJ);
     }
   }
   int n = 0;
@@ -85,21 +85,21 @@ std::span<const double> LocalizationFilter::error_of(const Feature& feature) con
   return {delta_.data() + feature.offset, static_cast<std::size_t>(feature.dim())};
 }
 
-/// The state moves, and errors are counted from where it is then: world_turn.h.
+/// The state moves, and errors are counted from where it is then: world_rotation.h.
 void LocalizationFilter::turn_by_delta() {
-  const WorldTurn turn(motion_.world_from_cam, delta_.segment<3>(3));
+  const WorldRotation turn(motion_.world_from_cam, delta_.segment<3>(3));
   const Eigen::Matrix3d G = turn.G(), J_left = right_jacobian(-turn.xi()), R = turn.world_from_cam();
   const CameraMotion was = motion_;
   motion_ = retract(was, delta_.head<motion_dim>());
-  motion_.world_from_cam.translation = G * turn.place_before(was.world_from_cam.translation, delta_.head<3>());
-  motion_.velocity_in_world = G * turn.place_before(was.velocity_in_world, delta_.segment<3>(6));
+  motion_.world_from_cam.translation = G * turn.position_before(was.world_from_cam.translation, delta_.head<3>());
+  motion_.velocity_in_world = G * turn.position_before(was.velocity_in_world, delta_.segment<3>(6));
   // First each error is rotated with its position, then what the rotation's error adds.
   const auto block = [&](int row) { return shear_.block<3, 3>(row, 0); };
   block(0) = block(6) = G;
   block(3) = block(9) = Eigen::Matrix3d::Identity();
   for (const Feature& feature : features_) {
     block(feature.offset) = G;
-    if (feature.dim() > 3) block(feature.offset + 3) = turn.J_turned_angles(feature, error_of(feature));
+    if (feature.dim() > 3) block(feature.offset + 3) = turn.J_rotated_angles(feature, error_of(feature));
   }
   P_.turn(shear_.data(), motion_dim, num_lens());
   given_.turn(shear_.data(), P_.capacity(), motion_dim, num_lens(), P_.dim());
@@ -112,12 +112,12 @@ void LocalizationFilter::turn_by_delta() {
   block(6) = added(was.velocity_in_world, motion_.velocity_in_world);
   for (Feature& feature : features_) {
     const Feature before = feature;
-    feature = WorldTurn::turned(G, turn.feature_before(before, error_of(before)));
+    feature = WorldRotation::turned(G, turn.feature_before(before, error_of(before)));
     block(feature.offset) = added(before.values.head<3>(), feature.values.head<3>());
     if (feature.dim() < 6) continue;
     block(feature.offset + 3) =
-        (turn.J_turned_angles(before, error_of(before)) * J_before_turn(before).bottomRows<3>() -
-         J_before_turn(feature).bottomRows<3>() * J_left) *
+        (turn.J_rotated_angles(before, error_of(before)) * J_before_rotation(before).bottomRows<3>() -
+         J_before_rotation(feature).bottomRows<3>() * J_left) *
         R;
   }
   constexpr int rotation_at = 3;
@@ -148,7 +148,7 @@ void LocalizationFilter::move_by_delta() {
     for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
     if (holds)
       shear_.middleRows(feature.offset, feature.dim()) =
-          (J_before_turn(before) * R - J_before_turn(feature) * RJ).topRows(feature.dim());
+          (J_before_rotation(before) * R - J_before_rotation(feature) * RJ).topRows(feature.dim());
   }
   P_.shear(rotation_at, shear_.data());
   given_.shear(rotation_at, shear_.data(), P_.capacity(), P_.dim());

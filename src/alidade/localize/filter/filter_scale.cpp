@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "alidade/localize/filter/filter.h"
-#include "alidade/localize/filter/world_turn.h"
+#include "alidade/localize/filter/world_rotation.h"
 
 // What an error of the world's scale is, and how it moves with the state: world_scale.h.
 
@@ -73,12 +73,12 @@ void LocalizationFilter::end_scale() {
 void LocalizationFilter::count_scale() {
   constexpr double smallest = -0.5;
   const double eps = delta_[*scale_at_], scale = 1.0 + std::max(eps, smallest);
-  const WorldTurn turn(motion_.world_from_cam, delta_.segment<3>(3));
+  const WorldRotation turn(motion_.world_from_cam, delta_.segment<3>(3));
   Eigen::VectorXd& u = next_;
   u.head(P_.dim()).setZero();
   const auto move = [&](const Eigen::Vector3d& place, int offset) {
     const Eigen::Vector3d error = delta_.segment<3>(offset);
-    const Eigen::Vector3d moved = turns_world_ ? (turn.place_before(place, error) - place).eval() : error;
+    const Eigen::Vector3d moved = turns_world_ ? (turn.position_before(place, error) - place).eval() : error;
     u.segment<3>(offset) = scale * (place + moved - eps * place) - place;
     delta_.segment<3>(offset) += u.segment<3>(offset) - moved;
   };

@@ -149,9 +149,9 @@ std::optional<double> LocalizationFilter::iterate(std::span<Measured*> group, bo
     }
     if (!step(group, must_fall, at)) break;
     has_answer = true;
-    double bend = 0.0;
-    for (std::size_t m = 0; m < group.size(); ++m) bend = std::max(bend, bend_between(*group[m], there_[m]));
-    if (bend < config_.bend_tolerance || iteration + 1 == max_iterations) break;
+    double curvature = 0.0;
+    for (std::size_t m = 0; m < group.size(); ++m) curvature = std::max(curvature, bend_between(*group[m], there_[m]));
+    if (curvature < config_.curvature_tolerance || iteration + 1 == max_iterations) break;
     for (std::size_t m = 0; m < group.size(); ++m) *group[m] = there_[m];
   }
   return has_answer ? std::optional(at.all) : std::nullopt;
@@ -199,12 +199,12 @@ bool LocalizationFilter::use_again() {
 
 void LocalizationFilter::refine() {
   for (int iteration = 0; iteration < config_.max_iterations; ++iteration) {
-    double bend = 0.0;
+    double curvature = 0.0;
     for (const Measured* measured : used_) {
       there_[0] = *measured;
-      if (linearise(there_[0])) bend = std::max(bend, bend_between(*measured, there_[0]));
+      if (linearise(there_[0])) curvature = std::max(curvature, bend_between(*measured, there_[0]));
     }
-    if (bend < config_.bend_tolerance) return;
+    if (curvature < config_.curvature_tolerance) return;
     for (Measured* measured : used_) (void)linearise(*measured);
     if (!use_again()) return;
   }
@@ -298,7 +298,7 @@ ObservationsReport LocalizationFilter::update(std::span<const FeatureObservation
   if (config_.holds_frame) begin_scale();
   collect(observations);
   double cost = best_attempt();
-  if (turns_world_ && !(delta_.segment<3>(3).norm() < config_.max_turn_rad)) {
+  if (turns_world_ && !(delta_.segment<3>(3).norm() < config_.max_rotation_rad)) {
     turns_world_ = false;
     cost = best_attempt();
   }

@@ -12,12 +12,12 @@
 
 namespace alidade {
 
-/// How the state of a filter moves with what it takes as given: the lens, as far as it is not in the state, and the
-/// target's scale. The filter's gains are those of one that takes these as exact; what their covariance Σ adds to the
-/// state's is M Σ Mᵀ, with M = ∂state/∂given carried beside it: M ← F M in a prediction, M ← M − P⁺ Hᵀ R⁻¹ (H M + H_g)
-/// in an update, and as P where errors are counted again (S. F. Schmidt, "Application of State-Space Methods to
-/// Navigation Problems", 1966; here the gains do not know of it). What the innovations say of a given number falls out:
-/// with D = H M + H_g, score Dᵀ S⁻¹ ν = Dᵀ R⁻¹ r of what is left over, r, and information Dᵀ R⁻¹ (D + H (M⁺ − M)).
+/// Consider parameters: how a filter's state depends on what it takes as given: the lens, where not in the state, and
+/// the target's scale. The filter's gains are those of one that takes these as exact; what their covariance Σ adds to
+/// the state's is M Σ Mᵀ, with M = ∂state/∂given carried beside it: M ← F M in a prediction, M ← M − P⁺ Hᵀ R⁻¹ (H M +
+/// H_g) in an update, and as P where errors are counted again (S. F. Schmidt, "Application of State-Space Methods to
+/// Navigation Problems", 1966; here the gains do not know of it). Score tests of the given numbers follow from it:
+/// with D = H M + H_g, score Dᵀ S⁻¹ ν = Dᵀ R⁻¹ r of the residuals r, and information Dᵀ R⁻¹ (D + H (M⁺ − M)).
 /// Allocates nothing after its construction.
 class GivenEffects {
  public:

@@ -15,7 +15,7 @@ LocalizationFilter followed(const HoverRun& run, const Camera& camera, double sc
   config.gate = 1e9;
   config.finds_consensus = false;
   config.max_iterations = 8;
-  config.bend_tolerance = 1e-9;
+  config.curvature_tolerance = 1e-9;
   CameraMotion start;
   start.world_from_cam = run.truth.front().world_from_cam;
   MotionMatrix cov = MotionMatrix::Zero();

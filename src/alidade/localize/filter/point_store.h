@@ -15,8 +15,8 @@ struct GonePoint {
   bool is_linear = false;  ///< Its position can be solved for.
 };
 
-/// What a run knows of points outside its filters: how often each was used or did not fit, and what is believed of the
-/// depth of one that is to enter the state.
+/// Bookkeeping of points outside the filters: how often each was used or rejected, and the depth prior of one that is
+/// to enter the state.
 class PointStore {
  public:
   explicit PointStore(const LocalizeConfig& config) : config_(&config) {}

@@ -6,11 +6,11 @@
 
 #include "alidade/localize/filter/feature.h"
 
-// No measurement but that of known points tells how large the world is: camera, speed and map may all be larger by one
-// factor. A filter whose derivatives follow its estimate forgets that, as it does for the world's turn (world_turn.h),
-// and a camera that speeds up or slows down then pulls the scale with it. So the error is counted along the estimate:
-// with N the state's scale direction (positions and velocities themselves, inverse depths with the other sign) and a
-// reading ε = cᵀe of the scale's error, cᵀN = 1,
+// Without known points the scale of the world is unobservable: camera, speed and map may all be larger by one factor.
+// An EKF, linearised at its changing estimate, loses that, as it does for the world's rotation (world_rotation.h), and
+// a camera that accelerates then biases the scale. So the error is counted
+// along the estimate: with N the state's scale direction (positions and velocities themselves, inverse depths with the
+// other sign) and a reading ε = cᵀe of the scale's error, cᵀN = 1,
 //     x = (1 + ε)(x̂ + e − N ε),
 // which to first order is x̂ + e. What is seen is a function of the second bracket alone. While an update goes on ε is
 // one more component of the state. Once the state has moved, N has moved by u, and what P holds along N it holds along

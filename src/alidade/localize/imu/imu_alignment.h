@@ -9,8 +9,8 @@
 
 namespace alidade {
 
-/// A first estimate of what an IMU says of a path, of unknown scale or in metres; where its readings are not what they
-/// are said to be, its fault. Clock and rotation of the mounting by the rates of both (W. Kabsch, "A solution for the
+/// Initial alignment of an IMU with a path of unknown scale or in metres; or the fault of its readings.
+/// Clock and rotation of the mounting by the rates of both (W. Kabsch, "A solution for the
 /// best rotation to relate two sets of vectors", Acta Cryst. A32, 1976); then scale, gravity and the forces' bias by
 /// linear least squares over steps of a quarter of a second (as T. Qin et al., "VINS-Mono", TRO 34(4), 2018, §V.B, for
 /// the inverse of the scale, whose coefficients are the IMU's and hardly noisy).

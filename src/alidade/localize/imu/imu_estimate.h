@@ -9,10 +9,10 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Why an IMU's readings have no part in a path.
+/// Why an IMU's readings are not used in a path.
 enum class ImuFault {
   none,
-  other_time,    ///< None of them is of the time of the path,
+  other_time,    ///< None of them lies within the time span of the path,
   few,           ///< or too few, between gaps.
   rate_degrees,  ///< Angular rates are in degrees per second,
   rate_unit,     ///< or larger than the camera's by another factor.
@@ -25,8 +25,8 @@ enum class ImuFault {
   no_gravity,    ///< Gravity has been subtracted.
   reversed,      ///< Forces have the other sign.
   still,         ///< The camera hardly accelerates: the scale is undetermined.
-  misfit,        ///< They are far from what the path says.
-  unsettled,     ///< There is no path with them.
+  misfit,        ///< They contradict the path.
+  unsettled,     ///< The path with them does not converge.
 };
 
 /// What was found of an IMU with a path: its readings as they are in the camera's frame, and gravity in the world's. σ

@@ -17,7 +17,7 @@ enum class Doubt {
 /// `part` of `of`, 0 where there is nothing.
 [[nodiscard]] double share(std::size_t part, std::size_t of);
 
-/// Whether the last frames say that the path is wrong: a path may fit its own map well and be elsewhere.
+/// Whether the last frames indicate that the path is wrong: it may fit its own map and still be wrong.
 class PathDoubt {
  public:
   /// Over five frames with observations. Strong: mean NIS above 2.

@@ -170,7 +170,7 @@ std::vector<PlacedResidual> PathSmoother::placed_residuals() const {
 bool PathSmoother::heed_colour() {
   constexpr double most = 0.98;
   structure_ = residual_structure(placed_residuals(), state_.camera);
-  if (structure_.has_colour()) link_observations(std::min(structure_.colour, most));
+  if (structure_.is_autocorrelated()) link_observations(std::min(structure_.autocorrelation, most));
   return settle();
 }
 

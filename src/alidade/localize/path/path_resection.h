@@ -16,7 +16,7 @@ struct PlacedObservation {
   Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
 };
 
-/// Where a camera is by observations of known positions, some of which may be mismatched.
+/// Resection: a camera's pose from observations of known positions, some of which may be mismatched.
 struct CameraResection {
   Rigid3 world_from_cam;
   double cost = 0.0;  ///< Squares over σ², of each observation at most the gate.

@@ -165,9 +165,9 @@ std::optional<SmoothedPath> PathSmoother::solve() {
 SmoothedPath PathSmoother::finished(const SmootherSystem& system) {
   SmoothedPath path = result(system);
   path.structure = residual_structure(path.residuals, state_.camera);
-  path.structure.colour = structure_.colour;  // that of the errors that were taken for independent
-  path.structure.sigma_colour = structure_.sigma_colour;
-  path.radial = radial_structure(path.residuals, state_.camera, structure_.has_colour());
+  path.structure.autocorrelation = structure_.autocorrelation;  // that of the errors that were taken for independent
+  path.structure.sigma_autocorrelation = structure_.sigma_autocorrelation;
+  path.radial = radial_structure(path.residuals, state_.camera, structure_.is_autocorrelated());
   path.num_dropped = problem_.observations.size() - observations_.size();
   if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.given_in_world.has_value(); }))
     widen(system.cost, path);

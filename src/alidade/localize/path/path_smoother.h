@@ -25,7 +25,7 @@ struct SmootherPoint {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  ///< To begin at.
   std::optional<Eigen::Vector3d> given_in_world;             ///< Of a known point, with its σ of each coordinate.
   double sigma_m = 0.001;
-  std::size_t first_frame = 0;      ///< Where its distance was believed to be
+  std::size_t first_frame = 0;      ///< Where its distance had the prior
   std::optional<RangePrior> range;  ///< this.
 };
 
@@ -37,9 +37,9 @@ struct PlacedResidual {
   double sigma_px = 0.5;
 };
 
-/// What of a path's position in the world no measurement says: its covariance is that after the best alignment.
+/// The gauge freedom of a path: where there is some, its covariance is that after the best alignment.
 enum class PathGauge {
-  fixed,       ///< A start or known points say it.
+  fixed,       ///< None: a start or known points fix it.
   motion,      ///< Position and rotation: the first camera is the world.
   similarity,  ///< Its unit of length as well.
 };
@@ -58,7 +58,7 @@ struct SmoothedImu {
   ImuState state;
   Eigen::VectorXd sigma;      ///< Of all its numbers.
   double sigma_scale = 0.0;   ///< Of the path's extent, over it.
-  double target_scale = 0.0;  ///< By how much larger it asks the target to be, relative, where there is one,
+  double target_scale = 0.0;  ///< Relative change of the target's size that it indicates, where there is one,
   double sigma_target = 0.0;  ///< and its σ.
   double rate_noise_factor = 1.0, force_noise_factor = 1.0;  ///< By which σ was enlarged.
   std::size_t num_steps = 0, num_rejected = 0, num_missing = 0;
@@ -99,7 +99,7 @@ struct SmoothedPath {
   double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was given, in the given σ.
   std::vector<GivenNumber> given;
   std::vector<PlacedResidual> residuals;
-  ResidualStructure structure;  ///< Where errors last from frame to frame, the path heeds that.
+  ResidualStructure structure;  ///< Autocorrelated errors are modelled in the path.
   RadialStructure radial;
   double chi2_per_dof = 0.0;  ///< Of the observations that fit.
   /// Along its least certain direction the cost rises more slowly to one side than to the other, or than σ says; σ is
@@ -112,11 +112,11 @@ struct SmoothedPath {
   std::optional<SmoothedImu> imu;
 };
 
-/// All observations of a recording together: a filter's derivatives are those of its moment, when depths were vague,
-/// and what they say of the world's frame and scale differs from one to the next, so that certainty is gained that no
-/// observation gave. Here all are taken at one linearisation point, the solution. Gauss–Newton over poses, points and
-/// lens with the filter's own motion model; poses are eliminated one after another (pose_chain.h). None where it does
-/// not settle.
+/// Batch smoothing of all observations of a recording: a filter linearises each at the estimate of its time, with vague
+/// depths, so that unobservable directions (frame, scale) differ between updates and information is gained that no
+/// observation gave. Here all are linearised at one point, the solution. Gauss–Newton over poses, points and
+/// lens with the filter's own motion model; poses are eliminated one after another (pose_chain.h). None where it
+/// does not converge.
 [[nodiscard]] std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem);
 
 /// Squares over σ² of the observations that fit, and the gate for each other one.

@@ -198,7 +198,7 @@ TEST(SimpleCase, ErrorsThatLastAreHeeded) {
     const HoverRun run = testing::hovering({.num_frames = 120, .num_others = 24, .lasting = 0.9}, 4000 + seed);
     const Localization report = hover_localized(run, run.camera);
     EXPECT_TRUE(report.is_smoothed);
-    EXPECT_NEAR(report.residuals.colour, 0.9, 0.06);
+    EXPECT_NEAR(report.residuals.autocorrelation, 0.9, 0.06);
     nees += mean_nees(report, run) / num_seeds;
   }
   RecordProperty("nees", std::to_string(nees));

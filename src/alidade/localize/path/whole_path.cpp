@@ -35,7 +35,7 @@ std::optional<SmoothedPath> best_path(const SmootherProblem& problem) {
   constexpr std::size_t max_frames = 600;  // farther on all depths alike are no guess
   auto smoothed = smoothed_path(problem);
   if (problem.gauge != PathGauge::similarity || problem.world_from_cam.size() > max_frames) return smoothed;
-  if (smoothed && !smoothed->structure.has_colour()) return smoothed;
+  if (smoothed && !smoothed->structure.is_autocorrelated()) return smoothed;
   const auto flat = flat_start(problem);
   if (!flat) return smoothed;
   auto other = smoothed_path(*flat);

@@ -15,13 +15,13 @@ constexpr double usual_wave = 0.005;
 constexpr double usual_k = 0.3, usual_p = 0.01, usual_mount_rad = 0.2, usual_delay_s = 0.1, usual_shutter_s = 0.03,
                  usual_zoom_per_s = 0.01, usual_parallax_rad = 0.05;
 
-ObserveNuisances without_turn(ObserveNuisances nuisances) {
-  nuisances.turn = false;
+ObserveNuisances without_rotation(ObserveNuisances nuisances) {
+  nuisances.rotation = false;
   return nuisances;
 }
 
 ObserveNuisances with_rotation(ObserveNuisances nuisances) {
-  nuisances.mount = nuisances.delay = nuisances.turn = true;
+  nuisances.mount = nuisances.delay = nuisances.rotation = true;
   return nuisances;
 }
 
@@ -37,7 +37,7 @@ std::vector<RotationError> errors_but(const RotationLog& log, const std::vector<
 
 CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, const CauseConfig& config)
     : reference_(reference),
-      base_(without_turn(config.nuisances)),
+      base_(without_rotation(config.nuisances)),
       wide_(with_rotation(config.nuisances)),
       height_(config.height),
       patterns_(turn_patterns(log, errors_but(log, config.errors), config.max_gap_s)),
@@ -167,7 +167,7 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
   by_causes.setZero();
   const Eigen::Vector3d in_cam = view_->point_in_cam(bearing);
   fill_lens(in_cam, by_causes);
-  const Eigen::Matrix<double, 2, 3> by_turn = wide.J_px_common.middleCols<3>(wide_.turn);
+  const Eigen::Matrix<double, 2, 3> by_rotation = wide.J_px_common.middleCols<3>(wide_.rotation);
   if (first_mount_ >= 0) by_causes.middleCols<3>(first_mount_) = wide.J_px_common.middleCols<3>(wide_.mount);
   if (first_delay_ >= 0) by_causes.col(first_delay_) = wide.J_px_common.col(wide_.delay);
   if (shutter_ >= 0) by_causes.col(shutter_) = wide.J_px_common.col(wide_.delay) * (seen.px.y() / height_);
@@ -185,14 +185,14 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
     // A pixel feels a shift v of its ray as the rotation ray × v / |ray|².
     const Eigen::Vector3d turned = mount_from_cam_ * in_cam;
     const Eigen::Matrix3d shift = mount_from_cam_ * (cam_from_start_ - Eigen::Matrix3d::Identity());
-    const Eigen::Matrix<double, 2, 3> by_lever = by_turn * (cross_matrix(turned) * shift) / in_cam.squaredNorm();
+    const Eigen::Matrix<double, 2, 3> by_lever = by_rotation * (cross_matrix(turned) * shift) / in_cam.squaredNorm();
     by_causes.middleCols<3>(first_lever_) = by_lever;
     if (lever_column_[point] >= 0) by_causes.col(lever_column_[point]) = by_lever.col(2);
     if (across_column_[point] >= 0) by_causes.middleCols<2>(across_column_[point]) = by_lever.leftCols<2>();
   }
   const std::size_t row = row_of_frame_[static_cast<std::size_t>(frame_)];
   for (std::size_t i = 0; i < patterns_.size(); ++i) {
-    by_causes.col(first_pattern_ + static_cast<int>(i)) = by_turn * patterns_[i].turn_rad[row];
+    by_causes.col(first_pattern_ + static_cast<int>(i)) = by_rotation * patterns_[i].turn_rad[row];
   }
   return true;
 }

@@ -5,21 +5,21 @@
 
 namespace alidade {
 
-/// One number of a cause, as one linearisation has it.
+/// One parameter of a cause, by one linearisation.
 struct CauseMember {
   std::string name;  ///< "k1", "of pan"
   std::string unit;
   double value = 0.0,
-         sigma = 0.0;  ///< What the residuals ask for, and how well they determine it; σ counts shared errors.
-  CommonVector moves;  ///< Of the estimated parameters, normalised, if it were one unit.
+         sigma = 0.0;  ///< The value that the residuals indicate, and its σ, which includes shared errors.
+  CommonVector moves;  ///< Change of the estimated parameters per unit, normalised.
 };
 
-/// Something that is taken as exact and may not be: would the residuals gain by more than chance if it were free?
+/// Score test of something taken as exact: whether freeing it would lower the residuals by more than chance.
 struct CauseScore {
   std::string name;   ///< "k1", "encoder scale", "backlash"
   double z = 0.0;     ///< Gain as a normal deviate.
-  double gain = 0.0;  ///< Of twice the log-posterior, for sizes that it ordinarily has, less what its freedom costs
-                      ///< (BIC): the largest explains best.
+  double gain = 0.0;  ///< Of twice the log-posterior with its typical σ as prior, less its penalty (BIC): the
+                      ///< largest explains best.
   std::vector<CauseMember> members;
   Eigen::MatrixXd information;  ///< Of the members, by these residuals and what errors they share.
   CommonVector shift;           ///< Of the estimated parameters if it were free, normalised.

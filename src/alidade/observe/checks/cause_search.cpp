@@ -183,7 +183,7 @@ bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const Obser
   AdjustConfig still;
   still.start = start_camera(sized, report.scale);
   still.other_starts = {2.5, 5.0};
-  int judged = 0, unsteady = 0;
+  int judged = 0, varying = 0;
   std::size_t k = 0;
   while (k < sample.frames.size()) {
     FrameBuffer buffer(sample.px.front().size(), max_search_frames);
@@ -199,9 +199,9 @@ bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const Obser
     if (!one.has_value || !changing.has_value) continue;  // a second that determines nothing
     ++judged;
     const bool is_better = changing.sigma_px < clearly * one.sigma_px;
-    unsteady += is_better && std::abs(changing.solution.camera.drift_per_s) > slowest_per_s ? 1 : 0;
+    varying += is_better && std::abs(changing.solution.camera.drift_per_s) > slowest_per_s ? 1 : 0;
   }
-  return judged >= 3 && unsteady > many * judged;
+  return judged >= 3 && varying > many * judged;
 }
 
 }  // namespace alidade

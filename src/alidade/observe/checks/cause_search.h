@@ -1,6 +1,6 @@
 #pragma once
 
-#include "alidade/observe/filters/steadiness.h"
+#include "alidade/observe/filters/frame_variation.h"
 #include "alidade/observe/solve/solve_once.h"
 
 namespace alidade {

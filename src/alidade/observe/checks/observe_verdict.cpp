@@ -212,7 +212,7 @@ Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, c
     if (report.status == Status::unobservable) verdict.checks.push_back(weakest(report));
     return verdict;
   }
-  if (report.status == Status::unsteady) {
+  if (report.status == Status::focal_length_varies) {
     const bool is_hybrid = config.method == ObserveMethod::hybrid;
     return refusal(is_hybrid ? "the focal length never rests: there is no second to estimate the points in"
                              : "the focal length changes within this log: one camera is no answer",

@@ -132,7 +132,7 @@ Check lasting_check(const ObserveSolution& report) {
 /// Do the residuals of a frame rotate together? An encoder's or a gyroscope's noise, which every row has again.
 Check jitter_check(const ObserveSolution& report) {
   constexpr double more_than_pixels = 3.0;
-  const TurnJitter& jitter = report.jitter;
+  const RotationJitter& jitter = report.jitter;
   const double sigma_rad = std::sqrt(jitter.variance_rad2);
   Check check{"rotation's noise", State::good,      "frames do not jitter beyond their pixels' noise",
               jitter.f_ratio,     more_than_pixels, "",

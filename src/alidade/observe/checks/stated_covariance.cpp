@@ -56,9 +56,9 @@ void add_lasting(const MatrixXd& half, double now_s, const LastingErrors& errors
 Parts parts_of(const Adjustment& reference, const ObserveNuisances& nuisances, int num_blocks,
                const LastingErrors& errors) {
   const RotationBundle& bundle = reference.bundle;
-  ObserveNuisances without_turn = nuisances;
-  without_turn.turn = false;
-  const CommonLayout layout(without_turn);
+  ObserveNuisances without_rotation = nuisances;
+  without_rotation.rotation = false;
+  const CommonLayout layout(without_rotation);
   const Eigen::Index n = layout.size;
   Parts parts{std::vector<Part>(static_cast<std::size_t>(num_blocks), Part(n)),
               std::vector<Part>(bundle.points.size(), Part(n)), MatrixXd::Zero(n, n)};

@@ -134,7 +134,7 @@ void add_fixed_centre(const ObserveSetup& config, const ObserveSolution& report,
                       std::vector<Assumption>& assumed) {
   if (!config.fixed_centre) return;
   const CommonMatrix& information = report.reference.solution.information;
-  const CommonMatrix& said = report.reference.solution.said_information;
+  const CommonMatrix& said = report.reference.solution.given_information;
   const Eigen::Matrix2d free = (information + said).topLeftCorner<2, 2>();
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d pull = -information.block<2, 1>(0, 2 + axis) * (ordinary_centre_px / report.scale.scale);

@@ -10,15 +10,15 @@
 
 namespace alidade {
 
-/// A way in which a measured rotation may be wrong, with one number.
+/// A one-parameter error model of a measured rotation.
 struct RotationError {
   std::string cause;      ///< "encoder scale"; errors of one cause are judged together.
   std::string member;     ///< "of pan"
   std::string unit;       ///< Of the number: "", "rad", "rad/s".
   std::string quantity;   ///< Its name in results: "scale_pan".
-  double ordinary = 1.0;  ///< σ of what instruments have of it.
+  double ordinary = 1.0;  ///< Typical σ of it in instruments.
   double derivative_step = 1e-6;
-  /// Takes so much of it out of the rows' rotation: true = measured · (1 + scale), measured + bias, and so on.
+  /// Corrects the rows' rotation by so much of it: true = measured · (1 + scale), measured + bias, and so on.
   std::function<void(std::span<RotationRow>, double amount)> undo;
 };
 

@@ -83,19 +83,19 @@ void ArrowheadFilter::remember_intrinsics() {
   is_summed_ = false;
 }
 
-void ArrowheadFilter::predict(const CommonVector& variance, double turn_sigma_rad) {
-  const bool turns = layout_.turn >= 0 && turn_sigma_rad > 0.0;
+void ArrowheadFilter::predict(const CommonVector& variance, double rotation_sigma_rad) {
+  const bool turns = layout_.rotation >= 0 && rotation_sigma_rad > 0.0;
   if (!turns && variance.isZero(0.0)) return;
   // c' = F c + w:  P' = F P Fᵀ + Q,  G = P Fᵀ P'⁻¹;  a point's slope becomes A G, its covariance gains A (P − G P' Gᵀ)
   // Aᵀ.
   const CommonMatrix before = covariance_;
   CommonMatrix kept = before;  // P Fᵀ
   if (turns) {
-    kept.middleCols<3>(layout_.turn).setZero();
-    covariance_.middleCols<3>(layout_.turn).setZero();
-    covariance_.middleRows<3>(layout_.turn).setZero();
-    covariance_.diagonal().segment<3>(layout_.turn).setConstant(turn_sigma_rad * turn_sigma_rad);
-    camera_.turn_rad.setZero();
+    kept.middleCols<3>(layout_.rotation).setZero();
+    covariance_.middleCols<3>(layout_.rotation).setZero();
+    covariance_.middleRows<3>(layout_.rotation).setZero();
+    covariance_.diagonal().segment<3>(layout_.rotation).setConstant(rotation_sigma_rad * rotation_sigma_rad);
+    camera_.rotation_error_rad.setZero();
   }
   covariance_.diagonal() += variance;
   precision_ = inverse(covariance_);
@@ -166,7 +166,7 @@ double ArrowheadFilter::nis() {
   return squares_ - gradient_.dot(all.llt().solve(gradient_));
 }
 
-ArrowheadFilter::Walk ArrowheadFilter::if_walked(const CommonVector& variance) const {
+ArrowheadFilter::Hypothesis ArrowheadFilter::with_added_variance(const CommonVector& variance) const {
   CommonMatrix walked = covariance_;
   walked.diagonal() += variance;
   CommonMatrix information = inverse(walked);
@@ -199,13 +199,13 @@ void ArrowheadFilter::add_score(Eigen::Vector4d& score, Eigen::Matrix4d& informa
   information += solver.solve(information_).topLeftCorner<4, 4>();
 }
 
-void ArrowheadFilter::add_own_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const {
+void ArrowheadFilter::add_point_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const {
   const Eigen::Matrix<double, 2, 4> by_k = seen_[i].by_common.leftCols<4>();
   score.noalias() += by_k.transpose() * (seen_[i].inverse_cov * seen_[i].innovation);
   information.noalias() += by_k.transpose() * seen_[i].inverse_cov * by_k;
 }
 
-double ArrowheadFilter::own_nis(std::size_t i) const {
+double ArrowheadFilter::point_nis(std::size_t i) const {
   const Seen& seen = seen_[i];
   const Eigen::Matrix2d cov = seen.inverse_cov.inverse() + seen.by_common * covariance_ * seen.by_common.transpose();
   return seen.innovation.dot(cov.inverse() * seen.innovation);

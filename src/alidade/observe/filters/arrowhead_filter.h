@@ -16,24 +16,24 @@ class ArrowheadFilter {
  public:
   ArrowheadFilter(const ObserveNuisances& nuisances, bool with_depth, std::size_t num_points);
 
-  /// Begins with a bundle's solution. Points that it does not know join when they are seen.
+  /// Initialises from a bundle's solution. Other points are added when they are first seen.
   void start(const BundleSolution& solution, const std::vector<int>& bundle_point_of, double sigma_px);
-  void forget_points();  ///< A new segment: points are met again, what they have in common stays.
+  void forget_points();  ///< A new segment: points are initialised again, the shared parameters are kept.
   void forget_point(std::size_t i) { points_[i].known = false; }
   /// From now on this point's pixels have so many times their variance.
-  void distrust(std::size_t i, double factor) { points_[i].variance_factor = factor; }
+  void inflate_variance(std::size_t i, double factor) { points_[i].variance_factor = factor; }
 
-  /// The intrinsics are about to change, the points are not: keeps fx, fy, cx, cy as the points were estimated with as
-  /// further shared parameters, so that what the points have in common stays in common. Once; later calls do nothing.
+  /// Before a zoom: keeps the fx, fy, cx, cy with which the points were estimated as further shared parameters, so that
+  /// the errors that points share through them stay correlated. Once; later calls do nothing.
   void remember_intrinsics();
-  /// The shared parameters walk: variances added, in the layout's order; `turn` is drawn again where `turn_sigma` > 0.
-  void predict(const CommonVector& variance, double turn_sigma_rad);
-  /// Takes up a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
+  /// Process noise: adds variances in the layout's order; with `rotation_sigma_rad` > 0 the rotation error is reset.
+  void predict(const CommonVector& variance, double rotation_sigma_rad);
+  /// Linearises a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
   void observe(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
-  /// Innovations are of so many points; point `i` (an index in this list) can be rejected.
+  /// Number of innovations; index `i` below is of this list.
   [[nodiscard]] std::size_t num_seen() const { return num_seen_; }
   [[nodiscard]] int seen_point(std::size_t i) const { return seen_[i].point; }
-  void leave_out(std::size_t i, bool out) {
+  void set_rejected(std::size_t i, bool out) {
     seen_[i].rejected = out;
     is_summed_ = false;
   }
@@ -41,27 +41,27 @@ class ArrowheadFilter {
   [[nodiscard]] int dof() const;
   /// Normalised innovation squared of the points not rejected.
   [[nodiscard]] double nis();
-  /// The same with `variance` added to the shared parameters before, and how they would move.
-  struct Walk {
+  /// NIS and update step of the shared parameters as if `variance` had been added to them before.
+  struct Hypothesis {
     double nis = 0.0;
     CommonVector step;
   };
-  [[nodiscard]] Walk if_walked(const CommonVector& variance) const;
-  /// The same of one point alone, 2 degrees of freedom.
-  [[nodiscard]] double own_nis(std::size_t i) const;
+  [[nodiscard]] Hypothesis with_added_variance(const CommonVector& variance) const;
+  /// NIS of one point alone, 2 degrees of freedom.
+  [[nodiscard]] double point_nis(std::size_t i) const;
   /// Adds the score of fx, fy, cx, cy, Gᵀ S⁻¹ ν, and its covariance Gᵀ S⁻¹ G: zero on the mean while nothing changes.
   void add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information);
-  /// One point's share of it, as if the shared parameters were known: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
-  void add_own_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const;
-  /// Takes the innovations in, but those rejected; new points join. After `observe`, once.
+  /// One point's contribution to it, with the shared parameters known: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
+  void add_point_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const;
+  /// Updates with the innovations that are not rejected, and adds new points. Once after `observe`.
   void update();
-  /// Takes a range of a known point in. False: it does not fit (beyond 4 σ), or the point has no depth.
+  /// Updates with the range of a known point. False: rejected (beyond 4 σ), or the point has no depth.
   bool update_range(const RotationFrame& frame, std::size_t point, double range_m, double sigma_range_m);
 
   [[nodiscard]] const RotatingCamera& camera() const { return camera_; }
   [[nodiscard]] const CommonLayout& layout() const { return layout_; }
   [[nodiscard]] const CommonMatrix& covariance() const { return covariance_; }
-  [[nodiscard]] bool knows(std::size_t point) const { return points_[point].known; }
+  [[nodiscard]] bool has_point(std::size_t point) const { return points_[point].known; }
   [[nodiscard]] const BearingPoint& point(std::size_t i) const { return points_[i].bearing; }
   [[nodiscard]] PointGivenCommon given_common(std::size_t i) const { return {points_[i].slope, points_[i].cov}; }
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/observe/filters/steadiness.h"
+#include "alidade/observe/filters/frame_variation.h"
 
 namespace alidade {
 namespace {
@@ -33,7 +33,7 @@ HybridObserver::HybridObserver(const HybridConfig& config)
       frames_out_(config.num_points, 0),
       patience_(config.num_points, slip_patience),
       candidate_(filter_),
-      own_drift_(config.num_points) {}
+      point_drift_(config.num_points) {}
 
 void HybridObserver::normalise(const RotationFrame& frame) {
   for (std::size_t i = 0; i < px_.size(); ++i) {
@@ -84,7 +84,7 @@ bool HybridObserver::adjust_buffer() {
     adjustment = adjust(buffer_, config);
   }
   if (!adjustment.has_value) return false;
-  if (!is_running_ && steadiness_of(adjustment.bundle, adjustment.solution).is_unsteady()) {
+  if (!is_running_ && focal_variation_of(adjustment.bundle, adjustment.solution).is_significant()) {
     buffer_.erase_before(buffer_.frames().back().t_s - config_.bootstrap_s);  // wait for a second at rest
     return false;
   }
@@ -102,7 +102,7 @@ bool HybridObserver::adjust_buffer() {
 
 void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
   const Eigen::Vector4d k_before = filter_.camera().k;
-  if (is_zooming_) filter_.predict(zoom_walk(), 0.0);
+  if (is_zooming_) filter_.predict(zoom_process_noise(), 0.0);
   filter_.observe(frame, px_);
   Judgement judgement = judge();
   if (judgement.event == ObserveEvent::burst && is_coarse_) {
@@ -111,7 +111,7 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     if (adjust_buffer()) filter_.observe(frame, px_);
     judgement = judge();
     judgement.accept = true;
-    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.leave_out(i, true);  // they are in already
+    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.set_rejected(i, true);  // they are in already
   }
   if (judgement.event == ObserveEvent::burst && !config_.no_zoom && is_zoom(frame)) {
     judgement.event = ObserveEvent::zoom;
@@ -133,8 +133,8 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     jump(filter_, frame);
   }
   take_in(frame, judgement);
-  if (is_zooming_) learn_zoom_walk(k_before);
-  if (is_zooming_ && has_come_to_rest()) {
+  if (is_zooming_) learn_zoom_process_noise(k_before);
+  if (is_zooming_ && has_zoom_ended()) {
     is_zooming_ = false;
     constant_since_s_ = frame.t_s;
     estimate.event = ObserveEvent::zoom_end;
@@ -146,12 +146,12 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
 bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   if (drift_frames_ == 0) {
     drift_ = {};
-    std::fill(own_drift_.begin(), own_drift_.end(), Score{});
+    std::fill(point_drift_.begin(), point_drift_.end(), Score{});
   }
   filter_.add_score(drift_.score, drift_.information);
   for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
-    Score& own = own_drift_[static_cast<std::size_t>(filter_.seen_point(i))];
-    if (!filter_.is_rejected(i)) filter_.add_own_score(i, own.score, own.information);
+    Score& own = point_drift_[static_cast<std::size_t>(filter_.seen_point(i))];
+    if (!filter_.is_rejected(i)) filter_.add_point_score(i, own.score, own.information);
   }
   if (++drift_frames_ < drift_window) return false;
   drift_frames_ = 0;
@@ -163,9 +163,9 @@ bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   if (point < 0) return !is_coarse_;
   estimate.event = ObserveEvent::slip;
   estimate.point = point;
-  renew(static_cast<std::size_t>(point));
+  reinitialise(static_cast<std::size_t>(point));
   for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
-    if (filter_.seen_point(i) == point) filter_.leave_out(i, true);
+    if (filter_.seen_point(i) == point) filter_.set_rejected(i, true);
   }
   return false;
 }
@@ -173,16 +173,16 @@ bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
 /// The point without which the window's scores are no more than chance; −1: none.
 int HybridObserver::drifting_point() const {
   Score all;
-  for (const Score& own : own_drift_) {
+  for (const Score& own : point_drift_) {
     all.score += own.score;
     all.information += own.information;
   }
   int best = -1;
   double least = chi2_quantile(4, gate_z);
-  for (std::size_t i = 0; i < own_drift_.size(); ++i) {
-    if (own_drift_[i].information.isZero(0.0)) continue;
-    const Eigen::Vector4d score = all.score - own_drift_[i].score;
-    const Eigen::Matrix4d information = all.information - own_drift_[i].information;
+  for (std::size_t i = 0; i < point_drift_.size(); ++i) {
+    if (point_drift_[i].information.isZero(0.0)) continue;
+    const Eigen::Vector4d score = all.score - point_drift_[i].score;
+    const Eigen::Matrix4d information = all.information - point_drift_[i].information;
     const Eigen::Matrix4d P = filter_.covariance().topLeftCorner<4, 4>();
     const double statistic = score.dot((information + information * P * information).ldlt().solve(score));
     if (!(statistic < least)) continue;
@@ -226,14 +226,14 @@ void HybridObserver::note_slips() {
       continue;
     }
     px_[point].setConstant(not_seen);
-    if (++frames_out_[point] >= patience_[point]) renew(point);
+    if (++frames_out_[point] >= patience_[point]) reinitialise(point);
   }
 }
 
 /// The point is met again; if it slips again, later and later.
-void HybridObserver::renew(std::size_t point) {
+void HybridObserver::reinitialise(std::size_t point) {
   filter_.forget_point(point);
-  filter_.distrust(point, slipped_variance);  // what slipped once may not stand still now either
+  filter_.inflate_variance(point, slipped_variance);  // what slipped once may not stand still now either
   buffer_.renew_point(point);
   frames_out_[point] = 0;
   patience_[point] = std::min(4 * patience_[point], 10000);
@@ -244,7 +244,7 @@ void HybridObserver::settle() {
 }
 
 void HybridObserver::restart(IntrinsicsEstimate& estimate) {
-  if (!is_zooming_) note_rest();
+  if (!is_zooming_) note_constant_span();
   is_running_ = is_zooming_ = false;
   has_candidate_ = false;
   buffer_.clear();
@@ -273,11 +273,11 @@ HybridObserver::Judgement HybridObserver::judge() {
   judgement.nis = filter_.nis();
   if (judgement.dof == 0) return judgement;
   if (judgement.nis <= chi2_quantile(judgement.dof, gate_z)) return judgement;
-  const double if_zoomed = filter_.if_walked(walk(filter_, any_zoom)).nis;
-  if (leave_out_until(gate_z, judgement)) {
+  const double if_zoomed = filter_.with_added_variance(process_noise(filter_, any_zoom)).nis;
+  if (reject_until(gate_z, judgement)) {
     // A change of the intrinsics moves all points, some little: it is no slip where it explains clearly more.
     if (!(judgement.nis - if_zoomed > better_by)) return judgement;
-    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.leave_out(i, false);
+    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.set_rejected(i, false);
     judgement.point = -1;
   }
   judgement.event = ObserveEvent::burst;
@@ -287,7 +287,7 @@ HybridObserver::Judgement HybridObserver::judge() {
 
 /// Rejects the worst points one by one until the rest fits: a slip. At most a third of them (one of three or four).
 /// False, with none rejected: that is not it.
-bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
+bool HybridObserver::reject_until(double z, Judgement& judgement) {
   const std::size_t seen = filter_.num_seen();
   const std::size_t most = seen < 3 ? 0 : std::max<std::size_t>(seen / 3, 1);
   for (std::size_t out = 0; out < most; ++out) {
@@ -295,18 +295,18 @@ bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
     double best = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < seen; ++i) {
       if (filter_.is_rejected(i)) continue;
-      double without = -filter_.own_nis(i);  // many points: the one that fits worst by itself
+      double without = -filter_.point_nis(i);  // many points: the one that fits worst by itself
       if (seen <= 12) {
-        filter_.leave_out(i, true);
+        filter_.set_rejected(i, true);
         without = filter_.nis();
-        filter_.leave_out(i, false);
+        filter_.set_rejected(i, false);
       }
       if (without < best) {
         best = without;
         worst = i;
       }
     }
-    filter_.leave_out(worst, true);
+    filter_.set_rejected(worst, true);
     judgement.point = filter_.seen_point(worst);
     judgement.nis = filter_.nis();
     judgement.dof = filter_.dof();
@@ -315,7 +315,7 @@ bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
       return true;
     }
   }
-  for (std::size_t i = 0; i < seen; ++i) filter_.leave_out(i, false);
+  for (std::size_t i = 0; i < seen; ++i) filter_.set_rejected(i, false);
   judgement.nis = filter_.nis();
   judgement.dof = filter_.dof();
   judgement.point = -1;

@@ -25,10 +25,10 @@ struct HybridConfig {
 };
 
 /// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
-/// while the answer is still coarse, then an extended Kalman filter (ArrowheadFilter) that judges each frame before it
-/// takes it in: an outlier point is rejected (and after 15 frames initialised again), an outlier frame is skipped, a
-/// change of the intrinsics is followed, as fast as it is. While the focal length does not stand still it does not
-/// begin. If nothing fits for a second it starts again. `step` allocates nothing once the adjustments are over (about 4
+/// while the answer is still coarse, then an extended Kalman filter (ArrowheadFilter) that tests each frame before its
+/// update: an outlier point is rejected (and after 15 frames reinitialised), an outlier frame is skipped, a change of
+/// the intrinsics is followed, however fast. It does not start while the focal length varies.
+/// If nothing fits for a second it is reinitialised. `step` allocates nothing once the adjustments are over (about 4
 /// s). docs/maths/rotating-camera.md.
 class HybridObserver {
  public:
@@ -40,17 +40,17 @@ class HybridObserver {
   [[nodiscard]] bool is_running() const { return is_running_; }
   /// σ of a pixel coordinate: given, or as the log determines so far. [px]
   [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
-  /// The σ that the filter reckons with, normalised: its covariance is in units of it.
+  /// The σ assumed by the filter, normalised: its covariance is in units of it.
   [[nodiscard]] double filter_sigma_px() const { return sigma_px_; }
-  /// A time in which the intrinsics did not change.
-  struct Rest {
+  /// A time span in which the intrinsics were constant.
+  struct ConstantSpan {
     double from_s = 0.0, until_s = 0.0;
     bool is_current = false;  ///< Lasts to the end, whether or not the last frames fit.
     [[nodiscard]] double duration_s() const { return until_s - from_s; }
   };
-  /// The longest so far; of no length while there is none.
-  [[nodiscard]] Rest longest_rest() const;
-  /// The log has ended: while the answer is coarse, all frames together say it best.
+  /// The longest so far; of zero length while there is none.
+  [[nodiscard]] ConstantSpan longest_constant_span() const;
+  /// At the end of the log: where the estimate is still coarse, adjusts all frames together.
   void settle();
 
  private:
@@ -67,28 +67,28 @@ class HybridObserver {
   bool adjust_buffer();
   void filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate);
   [[nodiscard]] Judgement judge();
-  bool leave_out_until(double gate_z, Judgement& judgement);
+  bool reject_until(double gate_z, Judgement& judgement);
   [[nodiscard]] bool is_zoom(const RotationFrame& frame);
   void jump(ArrowheadFilter& filter, const RotationFrame& frame) const;
   void begin_zoom();
   [[nodiscard]] bool has_drifted(IntrinsicsEstimate& estimate);
   [[nodiscard]] int drifting_point() const;
-  void renew(std::size_t point);
-  [[nodiscard]] bool has_come_to_rest();
+  void reinitialise(std::size_t point);
+  [[nodiscard]] bool has_zoom_ended();
   void take_in(const RotationFrame& frame, const Judgement& judgement);
   [[nodiscard]] bool has_gained_much();
   void note_slips();
-  void note_rest();
+  void note_constant_span();
   void restart(IntrinsicsEstimate& estimate);
-  [[nodiscard]] CommonVector walk(const ArrowheadFilter& filter, double frames) const;
-  [[nodiscard]] CommonVector zoom_walk() const;
-  void learn_zoom_walk(const Eigen::Vector4d& k_before);
+  [[nodiscard]] CommonVector process_noise(const ArrowheadFilter& filter, double frames) const;
+  [[nodiscard]] CommonVector zoom_process_noise() const;
+  void learn_zoom_process_noise(const Eigen::Vector4d& k_before);
   [[nodiscard]] double noise_ratio() const;
   void report(double t_s, IntrinsicsEstimate& estimate) const;
 
-  static constexpr double gate_z = 3.09;   ///< One frame in a thousand is called bad by chance.
-  static constexpr double any_zoom = 1e6;  ///< Frames worth of change: whatever the pixels want.
-  static constexpr int rest_frames = 10;   ///< Over which a zoom that is over shows no change.
+  static constexpr double gate_z = 3.09;     ///< One good frame in a thousand is rejected.
+  static constexpr double any_zoom = 1e6;    ///< So many frames of zoom at once: hardly a prior on the intrinsics.
+  static constexpr int settled_frames = 10;  ///< Without change over so many frames a zoom has ended.
 
   HybridConfig config_;
   ArrowheadFilter filter_;
@@ -103,20 +103,20 @@ class HybridObserver {
   double sigma_px_ = 0.0;  ///< Normalised.
   double next_adjustment_s_ = 0.0;
   double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
-  Rest rest_;                                                    ///< The longest before the intrinsics last changed.
+  ConstantSpan constant_span_;                                   ///< The longest before the intrinsics last changed.
   Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, by the last adjustment.
   int frames_since_adjustment_ = 0;
   double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.
   bool is_zooming_ = false;
   Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();  ///< Of a frame's change while zooming, as it was of late.
-  std::array<Eigen::Vector4d, rest_frames> past_k_;
+  std::array<Eigen::Vector4d, settled_frames> past_k_;
   int past_count_ = 0;
   struct Score {
     Eigen::Vector4d score = Eigen::Vector4d::Zero();
     Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   };
   Score drift_;
-  std::vector<Score> own_drift_;  ///< One per point.
+  std::vector<Score> point_drift_;  ///< One per point.
   int drift_frames_ = 0;
 };
 

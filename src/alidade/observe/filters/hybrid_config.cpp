@@ -21,7 +21,7 @@ std::optional<CommonPrior> said_prior(const ObserveSetup& config, const Rotating
   if (config.square_pixels) prior.sigma_aspect = held;
   if (config.fixed_centre) {
     prior.sigma_k.tail<2>().setConstant(held);
-    prior.says_k[2] = prior.says_k[3] = true;
+    prior.is_given_k[2] = prior.is_given_k[3] = true;
   }
   return prior;
 }
@@ -63,7 +63,7 @@ AdjustConfig adjust_config_of(const RotationLog& log, const ObserveSetup& config
                               const PixelScale& scale) {
   AdjustConfig adjust;
   adjust.nuisances = config.nuisances;
-  adjust.nuisances.turn = config.rotation != RotationKnowledge::known;
+  adjust.nuisances.rotation = config.rotation != RotationKnowledge::known;
   adjust.with_depth = needs_depth(log, config);
   adjust.sigma_px = config.sigma_px.value_or(0.0) / scale.scale;
   adjust.sigma_range_m = config.sigma_range_m;
@@ -71,11 +71,11 @@ AdjustConfig adjust_config_of(const RotationLog& log, const ObserveSetup& config
   adjust.start = start;
   adjust.prior = said_prior(config, start);
   if (config.rotation == RotationKnowledge::free) {
-    adjust.sigma_turn_rad = std::numeric_limits<double>::infinity();
+    adjust.sigma_rotation_rad = std::numeric_limits<double>::infinity();
   } else if (log.source == RotationSource::rate) {
     adjust.sigma_rate_rad_per_s = config.sigma_rate_rad_per_s.value_or(1e-3);
   } else {
-    adjust.sigma_turn_rad = config.sigma_angle_rad.value_or(1e-4);
+    adjust.sigma_rotation_rad = config.sigma_angle_rad.value_or(1e-4);
   }
   if (!config.start) adjust.other_starts = {0.7, 2.5, 5.0, 10.0};
   return adjust;

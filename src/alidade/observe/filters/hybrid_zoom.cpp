@@ -13,7 +13,7 @@ constexpr double zoom_memory = 0.8;  // of a frame's change for the next frame's
 }  // namespace
 
 /// Variance that so many frames of zoom add.
-CommonVector HybridObserver::walk(const ArrowheadFilter& filter, double frames) const {
+CommonVector HybridObserver::process_noise(const ArrowheadFilter& filter, double frames) const {
   CommonVector variance = CommonVector::Zero(filter.layout().size);
   const double sigma = config_.zoom_px / config_.scale.scale;
   variance.head<4>().setConstant(frames * sigma * sigma);
@@ -21,13 +21,13 @@ CommonVector HybridObserver::walk(const ArrowheadFilter& filter, double frames) 
 }
 
 /// The same for the frame to come, as fast as the zoom was of late.
-CommonVector HybridObserver::zoom_walk() const {
-  CommonVector variance = walk(filter_, 1.0);
+CommonVector HybridObserver::zoom_process_noise() const {
+  CommonVector variance = process_noise(filter_, 1.0);
   variance.head<4>() = variance.head<4>().cwiseMax(zoom_variance_);
   return variance;
 }
 
-void HybridObserver::learn_zoom_walk(const Eigen::Vector4d& k_before) {
+void HybridObserver::learn_zoom_process_noise(const Eigen::Vector4d& k_before) {
   const Eigen::Vector4d step = filter_.camera().k - k_before;
   zoom_variance_ = zoom_memory * zoom_variance_ + (1.0 - zoom_memory) * step.cwiseAbs2();
 }
@@ -37,10 +37,10 @@ void HybridObserver::learn_zoom_walk(const Eigen::Vector4d& k_before) {
 bool HybridObserver::is_zoom(const RotationFrame& frame) {
   const int left = std::max(filter_.dof() - 4, 0);
   const double gate = left > 0 ? chi2_quantile(left, gate_z) : 1.0;
-  const bool fits_another = filter_.if_walked(walk(filter_, any_zoom)).nis <= gate;
+  const bool fits_another = filter_.with_added_variance(process_noise(filter_, any_zoom)).nis <= gate;
   const bool fits_clearly = fits_another && left >= clearly_left;
   if (has_candidate_ && !is_zooming_) {
-    candidate_.predict(walk(candidate_, 1.0), 0.0);
+    candidate_.predict(process_noise(candidate_, 1.0), 0.0);
     candidate_.observe(frame, px_);
     if (candidate_.dof() > 0 && candidate_.nis() <= chi2_quantile(candidate_.dof(), gate_z)) {
       filter_ = candidate_;  // and this frame is about to be taken in
@@ -65,9 +65,9 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
 /// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
 /// make a drift of 1 px as noisy as one frame is.
 void HybridObserver::jump(ArrowheadFilter& filter, const RotationFrame& frame) const {
-  const CommonVector step = filter.if_walked(walk(filter, any_zoom)).step;
+  const CommonVector step = filter.with_added_variance(process_noise(filter, any_zoom)).step;
   filter.remember_intrinsics();
-  CommonVector variance = walk(filter, 4.0);
+  CommonVector variance = process_noise(filter, 4.0);
   variance.head<4>() += step.head<4>().cwiseAbs2();
   filter.predict(variance, 0.0);
   filter.observe(frame, px_);
@@ -77,7 +77,7 @@ void HybridObserver::begin_zoom() {
   if (!is_zooming_) {
     past_count_ = 0;
     zoom_variance_.setZero();
-    note_rest();
+    note_constant_span();
   }
   is_zooming_ = true;
   drift_frames_ = 0;
@@ -86,25 +86,25 @@ void HybridObserver::begin_zoom() {
 }
 
 /// The last frames' estimates differ by no more than their noise.
-bool HybridObserver::has_come_to_rest() {
+bool HybridObserver::has_zoom_ended() {
   const Eigen::Vector4d now = filter_.camera().k;
-  const Eigen::Vector4d before = past_k_[static_cast<std::size_t>(past_count_ % rest_frames)];
-  past_k_[static_cast<std::size_t>(past_count_ % rest_frames)] = now;
-  if (past_count_++ < rest_frames) return false;
-  if ((zoom_variance_.array() > 4.0 * walk(filter_, 1.0).head<4>().array()).any()) return false;
+  const Eigen::Vector4d before = past_k_[static_cast<std::size_t>(past_count_ % settled_frames)];
+  past_k_[static_cast<std::size_t>(past_count_ % settled_frames)] = now;
+  if (past_count_++ < settled_frames) return false;
+  if ((zoom_variance_.array() > 4.0 * process_noise(filter_, 1.0).head<4>().array()).any()) return false;
   const Eigen::Vector4d sigma = filter_.covariance().diagonal().head<4>().cwiseSqrt() * std::sqrt(2.0);
   return ((now - before).cwiseAbs().array() < 3.0 * sigma.array()).all();
 }
 
 /// The intrinsics were constant until now.
-void HybridObserver::note_rest() {
-  const Rest rest{constant_since_s_, last_fit_s_};
-  if (rest.duration_s() > rest_.duration_s()) rest_ = rest;
+void HybridObserver::note_constant_span() {
+  const ConstantSpan span{constant_since_s_, last_fit_s_};
+  if (span.duration_s() > constant_span_.duration_s()) constant_span_ = span;
 }
 
-HybridObserver::Rest HybridObserver::longest_rest() const {
-  const Rest rest{constant_since_s_, last_fit_s_, true};
-  return is_running_ && !is_zooming_ && rest.duration_s() >= rest_.duration_s() ? rest : rest_;
+HybridObserver::ConstantSpan HybridObserver::longest_constant_span() const {
+  const ConstantSpan span{constant_since_s_, last_fit_s_, true};
+  return is_running_ && !is_zooming_ && span.duration_s() >= constant_span_.duration_s() ? span : constant_span_;
 }
 
 }  // namespace alidade

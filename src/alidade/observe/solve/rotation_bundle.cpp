@@ -16,15 +16,15 @@ constexpr double inverse_depth_information = 1.0;  // a point is 1 m away or far
 using PointByCommon = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
 
 /// The state of a bundle in its search: everything that is estimated.
-struct Place {
+struct AdjustedState {
   RotatingCamera camera;
   std::vector<BearingPoint> points;
-  std::vector<Eigen::Vector3d> turns;  ///< One per frame, or none.
+  std::vector<Eigen::Vector3d> rotation_errors;  ///< One per frame, or none.
 };
 
 struct PointFrameBlock {
   int frame = 0;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< point × turn
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< point × rotation error
 };
 
 struct PointBlock {
@@ -37,16 +37,16 @@ struct PointBlock {
 class Solver {
  public:
   Solver(const RotationBundle& bundle, const CommonPrior& prior, const RotationBundleConfig& config)
-      : bundle_(bundle), prior_(prior), config_(config), layout_(without_turn(config.nuisances)) {
-    turns_ = config.nuisances.turn ? static_cast<int>(bundle.frames.size()) : 0;
-    place_ = {bundle.camera, bundle.points,
+      : bundle_(bundle), prior_(prior), config_(config), layout_(without_rotation(config.nuisances)) {
+    num_rotations_ = config.nuisances.rotation ? static_cast<int>(bundle.frames.size()) : 0;
+    state_ = {bundle.camera, bundle.points,
               std::vector<Eigen::Vector3d>(bundle.frames.size(), Eigen::Vector3d::Zero())};
     blocks_.resize(bundle.points.size());
   }
 
   BundleSolution solve(const Progress& progress) {
     BundleSolution solution;
-    double cost = cost_at(place_);
+    double cost = cost_at(state_);
     double damping = 1e-4;
     for (int i = 0; i < config_.max_iterations && std::isfinite(cost); ++i) {
       report_progress(progress, "adjust", static_cast<std::size_t>(i),
@@ -56,10 +56,10 @@ class Solver {
       bool moved = false;
       double next_cost = cost;
       for (int attempt = 0; attempt < 12 && !moved; ++attempt) {
-        const Place next = stepped(damping);
+        const AdjustedState next = stepped(damping);
         next_cost = cost_at(next);
         moved = next_cost <= cost;
-        if (moved) place_ = next;
+        if (moved) state_ = next;
         damping = moved ? std::max(damping * 0.1, 1e-12) : damping * 10.0;
       }
       // Nothing lowers the cost any more: the bottom, but for rounding.
@@ -77,17 +77,17 @@ class Solver {
   }
 
  private:
-  static ObserveNuisances without_turn(ObserveNuisances nuisances) {
-    nuisances.turn = false;
+  static ObserveNuisances without_rotation(ObserveNuisances nuisances) {
+    nuisances.rotation = false;
     return nuisances;
   }
 
-  [[nodiscard]] RotationFrame frame_at(const Place& place, int frame) const {
-    RotationFrame turned = bundle_.frames[static_cast<std::size_t>(frame)];
-    if (turns_ > 0) {
-      turned.cam_from_start = exp_so3(place.turns[static_cast<std::size_t>(frame)]) * turned.cam_from_start;
+  [[nodiscard]] RotationFrame frame_at(const AdjustedState& state, int frame) const {
+    RotationFrame rotated = bundle_.frames[static_cast<std::size_t>(frame)];
+    if (num_rotations_ > 0) {
+      rotated.cam_from_start = exp_so3(state.rotation_errors[static_cast<std::size_t>(frame)]) * rotated.cam_from_start;
     }
-    return turned;
+    return rotated;
   }
 
   [[nodiscard]] double huber_cost(double norm) const {
@@ -100,79 +100,81 @@ class Solver {
   }
 
   /// Twice the negative log-likelihood; infinite where a point has no pixel.
-  [[nodiscard]] double cost_at(const Place& place) const {
+  [[nodiscard]] double cost_at(const AdjustedState& state) const {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    if (!(place.camera.k[0] > 0.02 && place.camera.k[1] > 0.02)) return infinity;
-    const CommonVector offset = prior_.offset(layout_, place.camera);
+    if (!(state.camera.k[0] > 0.02 && state.camera.k[1] > 0.02)) return infinity;
+    const CommonVector offset = prior_.offset(layout_, state.camera);
     double cost = offset.dot(prior_.information(layout_) * offset);
     std::optional<RotationView> view;
     int frame = -1;
     for (const BundleObservation& seen : bundle_.observations) {
-      if (seen.frame != frame) view.emplace(place.camera, frame_at(place, frame = seen.frame));
-      const auto px = view->project(place.points[static_cast<std::size_t>(seen.point)]);
+      if (seen.frame != frame) view.emplace(state.camera, frame_at(state, frame = seen.frame));
+      const auto px = view->project(state.points[static_cast<std::size_t>(seen.point)]);
       if (!px) return infinity;
       cost += huber_cost((*px - seen.px).norm() / config_.sigma_px);
     }
     for (const BundleRange& range : bundle_.ranges) {
-      const double residual = range_residual(place, range);
+      const double residual = range_residual(state, range);
       if (!std::isfinite(residual)) return infinity;
       cost += huber_cost(std::abs(residual));
     }
     if (config_.with_depth) {
-      for (std::size_t i = 0; i < place.points.size(); ++i) {
-        const double change = place.points[i].inverse_depth - bundle_.points[i].inverse_depth;
+      for (std::size_t i = 0; i < state.points.size(); ++i) {
+        const double change = state.points[i].inverse_depth - bundle_.points[i].inverse_depth;
         cost += inverse_depth_information * change * change;
       }
     }
-    for (int k = 0; k < turns_; ++k) {
-      cost += turn_information(k) *
-              (turn(place, k) - (walks() ? turn(place, k - 1) : Eigen::Vector3d::Zero())).squaredNorm();
+    for (int k = 0; k < num_rotations_; ++k) {
+      cost += rotation_information(k) *
+              (rotation_error(state, k) - (is_random_walk() ? rotation_error(state, k - 1) : Eigen::Vector3d::Zero()))
+                  .squaredNorm();
     }
     return cost;
   }
 
-  [[nodiscard]] bool walks() const { return config_.sigma_rate_rad_per_s > 0.0; }
-  [[nodiscard]] static Eigen::Vector3d turn(const Place& place, int k) {
-    return k < 0 ? Eigen::Vector3d::Zero() : place.turns[static_cast<std::size_t>(k)];
+  [[nodiscard]] bool is_random_walk() const { return config_.sigma_rate_rad_per_s > 0.0; }
+  [[nodiscard]] static Eigen::Vector3d rotation_error(const AdjustedState& state, int k) {
+    return k < 0 ? Eigen::Vector3d::Zero() : state.rotation_errors[static_cast<std::size_t>(k)];
   }
   /// 1/σ² of a rotation, or of its step from the frame before. The first frame of rotations that are not measured, or
   /// walk, is fixed: the world's orientation is free.
-  [[nodiscard]] double turn_information(int k) const {
-    constexpr double held = 1e12;
-    if (!walks())
-      return std::isfinite(config_.sigma_turn_rad) ? 1.0 / square(config_.sigma_turn_rad) : (k == 0 ? held : 0.0);
+  [[nodiscard]] double rotation_information(int k) const {
+    constexpr double fixed = 1e12;
+    if (!is_random_walk())
+      return std::isfinite(config_.sigma_rotation_rad) ? 1.0 / square(config_.sigma_rotation_rad)
+                                                       : (k == 0 ? fixed : 0.0);
     const auto i = static_cast<std::size_t>(k);
-    if (k == 0) return held;
+    if (k == 0) return fixed;
     const double elapsed_s = bundle_.frames[i].t_s - bundle_.frames[i - 1].t_s;
-    return 1.0 / std::max(square(config_.sigma_rate_rad_per_s) * bundle_.frames[i].dt_s * elapsed_s, 1.0 / held);
+    return 1.0 / std::max(square(config_.sigma_rate_rad_per_s) * bundle_.frames[i].dt_s * elapsed_s, 1.0 / fixed);
   }
 
   [[nodiscard]] static double square(double x) { return x * x; }
 
-  [[nodiscard]] double range_residual(const Place& place, const BundleRange& range) const {
-    const BearingPoint& point = place.points[static_cast<std::size_t>(range.point)];
+  [[nodiscard]] double range_residual(const AdjustedState& state, const BundleRange& range) const {
+    const BearingPoint& point = state.points[static_cast<std::size_t>(range.point)];
     if (!(point.inverse_depth > 0.0)) return std::numeric_limits<double>::infinity();
-    const RotationFrame frame = frame_at(place, range.frame);
-    const double distance_m = RotationView(place.camera, frame).point_in_cam(point).norm() / point.inverse_depth;
+    const RotationFrame frame = frame_at(state, range.frame);
+    const double distance_m = RotationView(state.camera, frame).point_in_cam(point).norm() / point.inverse_depth;
     return (distance_m - range.range_m) / config_.sigma_range_m;
   }
 
   /// Normal equations at that state, prior included.
   void linearise() {
     const int n = layout_.size;
-    common_.setZero(n + 3 * turns_, n + 3 * turns_);
-    gradient_.setZero(n + 3 * turns_);
+    common_.setZero(n + 3 * num_rotations_, n + 3 * num_rotations_);
+    gradient_.setZero(n + 3 * num_rotations_);
     common_.topLeftCorner(n, n) = prior_.information(layout_);
-    gradient_.head(n) = prior_.information(layout_) * prior_.offset(layout_, place_.camera);
+    gradient_.head(n) = prior_.information(layout_) * prior_.offset(layout_, state_.camera);
     for (std::size_t i = 0; i < blocks_.size(); ++i) begin_point(i);
     residual_px_.clear();
     residuals_.clear();
     sum_squares_ = 0.0;
-    for (int k = 0; k < turns_; ++k) add_turn_prior(k);
+    for (int k = 0; k < num_rotations_; ++k) add_rotation_prior(k);
     std::optional<RotationView> view;
     int frame = -1;
     for (const BundleObservation& seen : bundle_.observations) {
-      if (seen.frame != frame) view.emplace(place_.camera, frame_at(place_, frame = seen.frame));
+      if (seen.frame != frame) view.emplace(state_.camera, frame_at(state_, frame = seen.frame));
       add_observation(*view, seen);
     }
     for (const BundleRange& range : bundle_.ranges) add_range(range);
@@ -187,20 +189,20 @@ class Solver {
     if (config_.with_depth) {
       block.information(2, 2) = inverse_depth_information;
       block.gradient[2] =
-          inverse_depth_information * (place_.points[i].inverse_depth - bundle_.points[i].inverse_depth);
+          inverse_depth_information * (state_.points[i].inverse_depth - bundle_.points[i].inverse_depth);
     } else {
       block.information(2, 2) = 1.0;  // nothing else touches it: the step is zero
     }
   }
 
-  void add_turn_prior(int k) {
-    const double information = turn_information(k);
+  void add_rotation_prior(int k) {
+    const double information = rotation_information(k);
     const int at = layout_.size + 3 * k;
     common_.diagonal().segment<3>(at).array() += information;
-    const Eigen::Vector3d before = walks() ? turn(place_, k - 1) : Eigen::Vector3d::Zero();
-    const Eigen::Vector3d pull = information * (turn(place_, k) - before);
+    const Eigen::Vector3d before = is_random_walk() ? rotation_error(state_, k - 1) : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d pull = information * (rotation_error(state_, k) - before);
     gradient_.segment<3>(at) += pull;
-    if (!walks() || k == 0) return;
+    if (!is_random_walk() || k == 0) return;
     common_.diagonal().segment<3>(at - 3).array() += information;
     common_.block<3, 3>(at, at - 3).diagonal().array() -= information;
     common_.block<3, 3>(at - 3, at).diagonal().array() -= information;
@@ -209,8 +211,8 @@ class Solver {
 
   void add_observation(const RotationView& view, const BundleObservation& seen) {
     RotationPrediction& p = prediction_;
-    const BearingPoint& point = place_.points[static_cast<std::size_t>(seen.point)];
-    if (!view.predict(point, turns_ > 0 ? turn_layout_ : layout_, p)) {
+    const BearingPoint& point = state_.points[static_cast<std::size_t>(seen.point)];
+    if (!view.predict(point, num_rotations_ > 0 ? rotation_layout_ : layout_, p)) {
       residual_px_.push_back(std::numeric_limits<double>::infinity());
       residuals_.push_back(Eigen::Vector2d::Constant(not_seen));
       return;
@@ -229,26 +231,27 @@ class Solver {
     block.information.noalias() += weight * p.J_px_point.transpose() * p.J_px_point;
     block.gradient.noalias() += weight * p.J_px_point.transpose() * error;
     block.by_common.noalias() += weight * p.J_px_point.transpose() * by_common;
-    if (turns_ > 0) add_turn(seen, p.J_px_common.middleCols<3>(turn_layout_.turn), by_common, error, weight, block);
+    if (num_rotations_ > 0)
+      add_rotation(seen, p.J_px_common.middleCols<3>(rotation_layout_.rotation), by_common, error, weight, block);
   }
 
-  void add_turn(const BundleObservation& seen, const Eigen::Matrix<double, 2, 3>& by_turn,
-                const PixelByCommon& by_common, const Eigen::Vector2d& error, double weight, PointBlock& block) {
+  void add_rotation(const BundleObservation& seen, const Eigen::Matrix<double, 2, 3>& by_rotation,
+                    const PixelByCommon& by_common, const Eigen::Vector2d& error, double weight, PointBlock& block) {
     const int at = layout_.size + 3 * seen.frame;
-    common_.block<3, 3>(at, at).noalias() += weight * by_turn.transpose() * by_turn;
-    common_.block(0, at, layout_.size, 3).noalias() += weight * by_common.transpose() * by_turn;
+    common_.block<3, 3>(at, at).noalias() += weight * by_rotation.transpose() * by_rotation;
+    common_.block(0, at, layout_.size, 3).noalias() += weight * by_common.transpose() * by_rotation;
     common_.block(at, 0, 3, layout_.size) = common_.block(0, at, layout_.size, 3).transpose();
-    gradient_.segment<3>(at).noalias() += weight * by_turn.transpose() * error;
+    gradient_.segment<3>(at).noalias() += weight * by_rotation.transpose() * error;
     PointFrameBlock by_frame{seen.frame};
-    by_frame.information.noalias() = weight * prediction_.J_px_point.transpose() * by_turn;
+    by_frame.information.noalias() = weight * prediction_.J_px_point.transpose() * by_rotation;
     block.by_frame.push_back(by_frame);
   }
 
   void add_range(const BundleRange& range) {
-    const double residual = range_residual(place_, range);
-    const BearingPoint& point = place_.points[static_cast<std::size_t>(range.point)];
-    const RotationFrame frame = frame_at(place_, range.frame);
-    const RotationView view(place_.camera, frame);
+    const double residual = range_residual(state_, range);
+    const BearingPoint& point = state_.points[static_cast<std::size_t>(range.point)];
+    const RotationFrame frame = frame_at(state_, range.frame);
+    const RotationView view(state_.camera, frame);
     const Eigen::Vector3d d = view.point_in_cam(point);
     PointByCommon J_common(3, layout_.size);
     Eigen::Matrix3d J_point;
@@ -294,18 +297,18 @@ class Solver {
     }
   }
 
-  [[nodiscard]] Place stepped(double damping) {
+  [[nodiscard]] AdjustedState stepped(double damping) {
     Eigen::MatrixXd reduced = common_;
     Eigen::VectorXd gradient = gradient_;
     reduced.diagonal() *= 1.0 + damping;
     eliminate_points(damping, reduced, gradient);
     const Eigen::VectorXd step = -solve_symmetric(reduced, gradient);
-    Place next = place_;
+    AdjustedState next = state_;
     const int n = layout_.size;
     if (!step.allFinite()) return next;
-    next.camera = place_.camera.retract(layout_, CommonVector(step.head(n)));
-    for (int k = 0; k < turns_; ++k) {
-      Eigen::Vector3d& at = next.turns[static_cast<std::size_t>(k)];
+    next.camera = state_.camera.retract(layout_, CommonVector(step.head(n)));
+    for (int k = 0; k < num_rotations_; ++k) {
+      Eigen::Vector3d& at = next.rotation_errors[static_cast<std::size_t>(k)];
       at = log_so3((exp_so3(step.segment<3>(n + 3 * k)) * exp_so3(at)).normalized());
     }
     for (std::size_t i = 0; i < blocks_.size(); ++i) {
@@ -322,25 +325,25 @@ class Solver {
 
   void conclude(BundleSolution& solution) {
     const int n = layout_.size;
-    solution.camera = place_.camera;
-    solution.points = place_.points;
+    solution.camera = state_.camera;
+    solution.points = state_.points;
     for (int k = 0; k < static_cast<int>(bundle_.frames.size()); ++k) {
-      solution.mount_from_start.push_back(frame_at(place_, k).cam_from_start);
+      solution.mount_from_start.push_back(frame_at(state_, k).cam_from_start);
     }
     Eigen::MatrixXd reduced = common_;
     Eigen::VectorXd gradient = gradient_;
     solution.prior_information = prior_.information(layout_);
-    solution.prior_gradient = solution.prior_information * prior_.offset(layout_, place_.camera);
-    solution.said_information = prior_.said_information(layout_);
+    solution.prior_gradient = solution.prior_information * prior_.offset(layout_, state_.camera);
+    solution.given_information = prior_.given_information(layout_);
     reduced.topLeftCorner(n, n) -= solution.prior_information;
     eliminate_points(0.0, reduced, gradient);
-    if (turns_ > 0) {
-      const auto turns = reduced.bottomRightCorner(3 * turns_, 3 * turns_);
-      const Eigen::MatrixXd by_common = reduced.bottomLeftCorner(3 * turns_, n);
+    if (num_rotations_ > 0) {
+      const auto turns = reduced.bottomRightCorner(3 * num_rotations_, 3 * num_rotations_);
+      const Eigen::MatrixXd by_common = reduced.bottomLeftCorner(3 * num_rotations_, n);
       reduced.topLeftCorner(n, n).noalias() -= by_common.transpose() * Ldlt(turns).solve_each(by_common);
     }
     solution.information = reduced.topLeftCorner(n, n);
-    for (std::size_t i = 0; i < blocks_.size() && turns_ == 0; ++i) {
+    for (std::size_t i = 0; i < blocks_.size() && num_rotations_ == 0; ++i) {
       solution.given_common.push_back({-inverse_[i] * blocks_[i].by_common, inverse_[i]});
     }
     solution.residual_px = residual_px_;
@@ -353,7 +356,9 @@ class Solver {
     const auto is_seen_at_all = [](const PointBlock& block) { return block.information(0, 0) > 0.0; };
     const auto num_points = static_cast<int>(std::count_if(blocks_.begin(), blocks_.end(), is_seen_at_all));
     const int unknowns = n + (config_.with_depth ? 3 : 2) * num_points +
-                         (turns_ > 0 && !walks() && !std::isfinite(config_.sigma_turn_rad) ? 3 * (turns_ - 1) : 0);
+                         (num_rotations_ > 0 && !is_random_walk() && !std::isfinite(config_.sigma_rotation_rad)
+                              ? 3 * (num_rotations_ - 1)
+                              : 0);
     solution.dof = static_cast<int>(2 * bundle_.observations.size() + bundle_.ranges.size()) - unknowns;
   }
 
@@ -361,9 +366,9 @@ class Solver {
   const CommonPrior& prior_;
   const RotationBundleConfig& config_;
   const CommonLayout layout_;
-  const CommonLayout turn_layout_{with_turn(config_.nuisances)};
-  int turns_ = 0;  ///< Frames whose rotation is estimated.
-  Place place_;
+  const CommonLayout rotation_layout_{with_turn(config_.nuisances)};
+  int num_rotations_ = 0;  ///< Frames whose rotation is estimated.
+  AdjustedState state_;
   Eigen::MatrixXd common_;  ///< Shared parameters, then rotations.
   Eigen::VectorXd gradient_;
   std::vector<PointBlock> blocks_;
@@ -374,7 +379,7 @@ class Solver {
   RotationPrediction prediction_;
 
   static ObserveNuisances with_turn(ObserveNuisances nuisances) {
-    nuisances.turn = true;
+    nuisances.rotation = true;
     return nuisances;
   }
 };

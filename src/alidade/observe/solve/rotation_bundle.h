@@ -24,14 +24,14 @@ struct BundleRange {
   double range_m = 0.0;
 };
 
-/// All that was measured, for one adjustment. `frames[i].px` are not looked at. Points of different segments are
+/// The measurements of one adjustment. `frames[i].px` are not used. Points of different segments are
 /// different points.
 struct RotationBundle {
   std::vector<RotationFrame> frames;
   std::vector<BundleObservation> observations;
   std::vector<BundleRange> ranges;
-  RotatingCamera camera;             ///< Where to start.
-  std::vector<BearingPoint> points;  ///< Where to start.
+  RotatingCamera camera;             ///< Initial guess.
+  std::vector<BearingPoint> points;  ///< Initial guess.
 };
 
 struct RotationBundleConfig {
@@ -39,20 +39,20 @@ struct RotationBundleConfig {
   bool with_depth = false;  ///< Points have a depth: a lever arm or a measured velocity is in play.
   double sigma_px = 1e-3;   ///< Of each observation, normalised.
   double sigma_range_m = 1e-3;
-  double sigma_turn_rad = 0.0;  ///< Of each frame's rotation, where nuisances.turn; infinite: not measured.
+  double sigma_rotation_rad = 0.0;  ///< Of each frame's rotation, where nuisances.rotation; infinite: not measured.
   double sigma_rate_rad_per_s =
-      0.0;  ///< Above zero: the rotation was integrated from rates with this white noise a sample, its error walks.
+      0.0;             ///< Above zero: rotations are integrated rates with this white noise per sample: a random walk.
   double huber = 2.5;  ///< Residuals beyond so many σ count less. 0: all count alike.
   int max_iterations = 60;
 };
 
-/// What is known of the shared parameters before: normal distributions, weak where nothing is said.
+/// Prior of the shared parameters: normal distributions, weak where nothing is given.
 struct CommonPrior {
   explicit CommonPrior(const RotatingCamera& mean_in);
   RotatingCamera mean;
-  Eigen::Vector4d sigma_k;       ///< fx, fy: half their value; cx, cy: a quarter of the image.
-  std::array<bool, 4> says_k{};  ///< sigma_k is said by a person, not weak.
-  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, where a person says so.
+  Eigen::Vector4d sigma_k;           ///< fx, fy: half their value; cx, cy: a quarter of the image.
+  std::array<bool, 4> is_given_k{};  ///< sigma_k is given by the user, not weak.
+  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, where given (square pixels).
   double sigma_k1 = 0.5;                                          ///< k2, k3 too.
   double sigma_tangential = 0.05;
   double sigma_mount_rad = 0.2;
@@ -60,14 +60,14 @@ struct CommonPrior {
   double sigma_lever_m = 0.3;
   double sigma_shutter_s = 0.05;
   double sigma_drift_per_s = 0.01;
-  double sigma_error = 1.0;  ///< Of errors of the rotation, which are in units of their ordinary sizes: said.
+  double sigma_error = 1.0;  ///< Of errors of the rotation, in units of their typical sizes: counts as given.
 
   [[nodiscard]] CommonMatrix information(const CommonLayout& layout) const;
-  /// Of what a person says alone.
-  [[nodiscard]] CommonMatrix said_information(const CommonLayout& layout) const;
+  /// Of what the user gave alone.
+  [[nodiscard]] CommonMatrix given_information(const CommonLayout& layout) const;
   /// Values minus the mean, in the layout's order.
   [[nodiscard]] CommonVector offset(const CommonLayout& layout, const RotatingCamera& camera) const;
-  /// The same knowledge; what is weak is weak about `camera`.
+  /// The same prior with its weak components centred on `camera`.
   [[nodiscard]] CommonPrior about(const RotatingCamera& camera) const;
 };
 
@@ -89,7 +89,7 @@ struct BundleSolution {
                              ///< units of 1/σ².
   CommonMatrix prior_information;
   CommonVector prior_gradient;                 ///< Of half the prior's cost.
-  CommonMatrix said_information;               ///< Of the prior, what a person said.
+  CommonMatrix given_information;              ///< Of the prior, the part that the user gave.
   std::vector<PointGivenCommon> given_common;  ///< One per point; not with free rotations.
   std::vector<Eigen::Vector2d> residuals;      ///< Prediction minus pixel, one per observation, normalised.
   std::vector<double> residual_px;             ///< Their norms.
@@ -102,14 +102,14 @@ struct BundleSolution {
   [[nodiscard]] CommonMatrix bound() const;
 };
 
-/// Rotation-only bundle adjustment: Levenberg–Marquardt on the shared parameters, all points, and (with nuisances.turn)
-/// each frame's rotation; points are eliminated block by block (Schur complement), so that the time grows linearly in
-/// them. Throws Interrupted.
-/// Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment — a modern synthesis", 2000, section 6.
+/// Rotation-only bundle adjustment: Levenberg–Marquardt on the shared parameters, all points, and (with
+/// nuisances.rotation) each frame's rotation; points are eliminated block by block (Schur complement), so that the time
+/// grows linearly in them. Throws Interrupted. Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment — a modern
+/// synthesis", 2000, section 6.
 [[nodiscard]] BundleSolution solve_rotation_bundle(const RotationBundle& bundle, const CommonPrior& prior,
                                                    const RotationBundleConfig& config, const Progress& progress = {});
 
-/// Robust σ of a coordinate from the residuals: their median norm over √(2 ln 2), freed of the unknowns' share.
+/// Robust σ of a coordinate from the residuals: their median norm over √(2 ln 2), corrected for the degrees of freedom.
 [[nodiscard]] double robust_sigma(std::vector<double> residual_norms, int dof);
 
 }  // namespace alidade

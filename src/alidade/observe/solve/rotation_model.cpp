@@ -23,7 +23,7 @@ CommonLayout::CommonLayout(const ObserveNuisances& nuisances) {
   place(nuisances.drift, drift, 1);
   place(nuisances.errors > 0, errors, num_errors = nuisances.errors);
   place(nuisances.learnt, learnt, 4);
-  place(nuisances.turn, turn, 3);
+  place(nuisances.rotation, rotation, 3);
 }
 
 namespace {
@@ -90,7 +90,7 @@ RotatingCamera RotatingCamera::retract(const CommonLayout& layout, const CommonV
     if (moved.errors.size() != layout.num_errors) moved.errors = RotationErrors::Zero(layout.num_errors);
     moved.errors += step.segment(layout.errors, layout.num_errors);
   }
-  if (layout.turn >= 0) moved.turn_rad += step.segment<3>(layout.turn);
+  if (layout.rotation >= 0) moved.rotation_error_rad += step.segment<3>(layout.rotation);
   return moved;
 }
 
@@ -127,8 +127,8 @@ void RotationView::turn_to(double late_s) {
     mount_from_start_ = turn * mount_from_start_;
     rate_ = turn * rate_;
   }
-  if (!camera_.turn_rad.isZero(0.0)) {
-    mount_from_start_ = exp_so3(camera_.turn_rad).toRotationMatrix() * mount_from_start_;
+  if (!camera_.rotation_error_rad.isZero(0.0)) {
+    mount_from_start_ = exp_so3(camera_.rotation_error_rad).toRotationMatrix() * mount_from_start_;
   }
   cam_from_start_ = cam_from_mount_ * mount_from_start_ * cam_from_mount_.transpose();
 }
@@ -239,7 +239,7 @@ void RotationView::point_jacobians(const BearingPoint& point, const CommonLayout
   const double chi = point.inverse_depth;
   const Eigen::Vector3d in_mount = cam_from_mount_.transpose() * (point.ray() + chi * camera_.lever_m);
   const Eigen::Vector3d turned = mount_from_start_ * in_mount;
-  const Eigen::Matrix3d by_turn = -cam_from_mount_ * cross_matrix(turned);
+  const Eigen::Matrix3d by_rotation = -cam_from_mount_ * cross_matrix(turned);
   J_common.setZero(3, layout.size);
   if (layout.mount >= 0) {
     J_common.middleCols<3>(layout.mount) =
@@ -252,9 +252,9 @@ void RotationView::point_jacobians(const BearingPoint& point, const CommonLayout
   if (layout.errors >= 0 && turn_by_.cols() == layout.num_errors) {
     Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
     if (camera_.errors.size() == layout.num_errors) turn = left_jacobian(turn_by_ * camera_.errors);
-    J_common.middleCols(layout.errors, layout.num_errors).noalias() = by_turn * turn * turn_by_;
+    J_common.middleCols(layout.errors, layout.num_errors).noalias() = by_rotation * turn * turn_by_;
   }
-  if (layout.turn >= 0) J_common.middleCols<3>(layout.turn) = by_turn;
+  if (layout.rotation >= 0) J_common.middleCols<3>(layout.rotation) = by_rotation;
   J_point.leftCols<2>() = cam_from_start_ * point.start_from_point.leftCols<2>();
   J_point.col(2) = cam_from_start_ * camera_.lever_m - camera_.lever_m + shift_m_;
 }

@@ -19,9 +19,9 @@ struct ObserveNuisances {
   bool shutter = false;     ///< The image's last row is of so much later than its first: a rolling shutter.
   bool drift = false;       ///< fx and fy grow by so much of themselves a second: warmth, a focus that creeps.
   int errors = 0;           ///< Errors of the measured rotation, so many: RotationFrame::turn_by.
-  bool learnt = false;  ///< fx, fy, cx, cy with which the points were estimated, before a zoom: they know nothing of
-                        ///< the new ones.
-  bool turn = false;    ///< Error of the measured rotation, 3 angles; one per frame in a bundle, of now in a filter.
+  bool learnt = false;    ///< fx, fy, cx, cy with which the points were estimated, before a zoom: they know nothing of
+                          ///< the new ones.
+  bool rotation = false;  ///< Error of the measured rotation, 3 angles; one per frame in a bundle, of now in a filter.
 };
 
 inline constexpr int max_common = 25 + max_rotation_errors;  ///< Of ObserveNuisances with everything.
@@ -36,7 +36,7 @@ struct CommonLayout {
 
   int size = 4;
   int k1 = -1, k2 = -1, k3 = -1, tangential = -1, mount = -1, delay = -1, lever = -1, shutter = -1, drift = -1,
-      errors = -1, learnt = -1, turn = -1;
+      errors = -1, learnt = -1, rotation = -1;
   int num_errors = 0;
 };
 
@@ -53,7 +53,7 @@ struct RotatingCamera {
   double drift_from_s = 0.0;  ///< Not estimated.
   RotationErrors errors;      ///< mount_now = Exp(turn_by · errors) · measured; in units of their ordinary sizes.
   RotationErrors undone;      ///< What the measured rotation has been freed of before, in the same units.
-  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< mount_now = Exp(turn) · measured.
+  Eigen::Vector3d rotation_error_rad = Eigen::Vector3d::Zero();  ///< mount_now = Exp(rotation_error) · measured.
 
   /// fx, fy, cx, cy of an instant.
   [[nodiscard]] Eigen::Vector4d k_at(double t_s) const;

@@ -60,7 +60,7 @@ constexpr ObserveNuisances everything{.k1 = true,
                                       .drift = true,
                                       .errors = max_rotation_errors,
                                       .learnt = true,
-                                      .turn = true};
+                                      .rotation = true};
 
 /// The rotation's derivative is about none: it is the error that is left.
 TEST(RotationModel, JacobiansAreTheDerivatives) {

@@ -205,7 +205,8 @@ void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const P
   constexpr double max_off = 3.0;
   const bool is_filter = config.method == ObserveMethod::hybrid || config.method == ObserveMethod::window;
   if (!is_filter || config.rotation != RotationKnowledge::known) return;
-  if (report.status == ObserveSolution::Status::unsteady || report.status == ObserveSolution::Status::too_few_data)
+  if (report.status == ObserveSolution::Status::focal_length_varies ||
+      report.status == ObserveSolution::Status::too_few_data)
     return;
   if (is_answer(report) && !(report.from_reference > max_off)) return;
   ObserveSetup whole = config;
@@ -249,7 +250,7 @@ void find_causes(const RotationLog& log, const ObserveSetup& given, const Progre
                  ObserveSolution& report, std::vector<Rival>& rivals) {
   using Status = ObserveSolution::Status;
   if (is_doubtful(report) && report.status != Status::unobservable) search_causes(log, progress, config, report);
-  if (report.status == Status::no_convergence || report.status == Status::unsteady) {
+  if (report.status == Status::no_convergence || report.status == Status::focal_length_varies) {
     ObserveSolution second = second_chance(log, config, progress);
     if (is_answer(second)) {
       report = std::move(second);
@@ -284,7 +285,7 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   }
   prefer_all_rows(log, config, progress, report);
   if (is_judged && !config.no_zoom && !misread.explains_all && never_rests(log, config, report, progress)) {
-    report.status = Status::unsteady;
+    report.status = Status::focal_length_varies;
   }
   if (is_answer(report)) {
     note_ungiven(report, estimated_errors(log, config), report.side_checks);

@@ -5,8 +5,8 @@
 #include "alidade/estimation/progress.h"
 #include "alidade/observe/checks/cause_scores.h"
 #include "alidade/observe/checks/stated_covariance.h"
+#include "alidade/observe/filters/frame_variation.h"
 #include "alidade/observe/filters/hybrid.h"
-#include "alidade/observe/filters/steadiness.h"
 #include "alidade/observe/frame_buffer.h"
 #include "alidade/observe/observer.h"
 #include "alidade/observe/report.h"
@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// A report while it is made: with what its sentences, its bound and its tests rest on.
+/// The report with the intermediate results that its verdict, bound and tests are based on.
 struct ObserveSolution : ObserveReport {
   PixelScale scale;
   double gramian_lambda_min = -1.0;  ///< Of fang2011; −1: not asked.
@@ -24,8 +24,8 @@ struct ObserveSolution : ObserveReport {
   /// Its information is the bound's.
   Adjustment reference;
   StatedCovariance stated;         ///< Of the reference.
-  TurnJitter jitter;               ///< Of its frames.
-  std::vector<CauseScore> causes;  ///< What the reference's residuals say of what was taken as exact.
+  RotationJitter jitter;           ///< Of its frames.
+  std::vector<CauseScore> causes;  ///< Score tests of what was taken as exact.
   /// The answer minus the reference over their σ, the largest of fx, fy, cx, cy, where both are of the same camera.
   double from_reference = 0.0;
   ObserveNuisances estimated;  ///< What was, in the end, beside fx, fy, cx, cy.
@@ -36,24 +36,24 @@ struct ObserveSolution : ObserveReport {
   bool sigma_is_distance = false;  ///< The method has no σ: stated is its distance from the reference.
 };
 
-/// Intrinsics of a rotating camera from what it saw while it rotated: what the setup asks for, and what the residuals
-/// do. Throws Interrupted. docs/maths/rotating-camera.md.
+/// Intrinsics of a rotating camera from its log: estimates what the setup requests, and what the residuals indicate.
+/// Throws Interrupted. docs/maths/rotating-camera.md.
 [[nodiscard]] ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& config,
                                                const Progress& progress = {});
 
-/// The same with what is given to be estimated, without a second thought.
+/// The same with the requested parameters only.
 [[nodiscard]] ObserveSolution solve_as_given(const RotationLog& log, const ObserveSetup& config,
                                              const Progress& progress = {});
 
-/// How a rotation was read otherwise than it was meant.
+/// A misinterpretation of the measured rotation (signs, axes, units, quaternion order).
 struct Misread {
   std::string words;          ///< Empty: it was not.
   bool is_sought = false;     ///< All readings were tried.
-  bool explains_all = false;  ///< Read so, the pixels fit as a finder's do.
+  bool explains_all = false;  ///< With it, the residuals are no larger than a detector's noise.
 };
 
-/// Is the answer, or that there is none, such that the rotation may be misread? And how: signs, axes, degrees,
-/// quaternions the other way round, whichever lets the pixels fit clearly better.
+/// Whether the result suggests that the rotation is misread; and the misreading: signs, axes, degrees, inverse
+/// quaternions, whichever fits the pixels clearly better.
 [[nodiscard]] bool may_be_misread(const ObserveSolution& report);
 [[nodiscard]] Misread misread_rotation(const RotationLog& log, const ObserveSetup& config,
                                        const ObserveSolution& report, const Progress& progress = {});
@@ -69,20 +69,20 @@ struct Misread {
 [[nodiscard]] std::vector<RotationError> estimated_errors(const RotationLog& log, const ObserveSetup& config);
 [[nodiscard]] bool needs_depth(const RotationLog& log, const ObserveSetup& config);
 [[nodiscard]] RotatingCamera start_camera(const ObserveSetup& config, const PixelScale& scale);
-/// What the person says of the camera; none if nothing.
+/// The prior given by the user; none if nothing is given.
 [[nodiscard]] std::optional<CommonPrior> said_prior(const ObserveSetup& config, const RotatingCamera& start);
 
-/// What the answer is worth, or why there is none and what to add.
+/// The verdict on the estimate, or why there is none and what to add.
 [[nodiscard]] Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log,
                                       const ObserveSetup& config);
 
-/// What a row shows whoever watches.
+/// A row as the live view shows it.
 [[nodiscard]] ObserveStep step_of(const RotationFrame& frame, const IntrinsicsEstimate& estimate);
 
 /// The camera that was observed, with its covariance: pinhole, or brown where k1 was estimated or `known` has a lens.
 [[nodiscard]] Camera observed_camera(const ObserveReport& report, const std::optional<Camera>& known);
 
-/// Image's centre and half width: of the size given, else of what holds the pixels.
+/// Image's centre and half width: of the given size, else of the smallest that contains the pixels.
 [[nodiscard]] PixelScale pixel_scale(const RotationLog& log, int& width_px, int& height_px);
 
 /// What the log and the person give, with the answer's move for an error of its σ or, without one, of what errors
@@ -90,18 +90,18 @@ struct Misread {
 [[nodiscard]] std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetup& config,
                                                      const ObserveSolution& report, CommonMatrix& cov);
 
-/// Checks of the verdict that look at the reference's residuals: what they ask for, whether errors are shared, whether
-/// the noise is one that trackers have, whether points stand still.
+/// Checks of the verdict on the reference's residuals: indicated causes, shared errors, whether the noise is that of a
+/// tracker, whether points are static.
 [[nodiscard]] std::vector<Check> residual_checks(const ObserveSolution& report);
 
-/// z at which the residuals ask for a cause: noise that a frame's pixels share makes chance larger.
+/// z beyond which a cause is indicated: raised where the pixels of a frame share noise.
 [[nodiscard]] double asked_beyond(const ObserveSolution& report);
 
-/// Is the rotation read as it was meant? A mount rotated by half a turn, or a misreading that fits better.
+/// Check for a misread rotation: a mount rotated by 180°, or a misreading that fits better.
 [[nodiscard]] Check rotation_check(const ObserveSolution& report);
 
-/// Where a log without measured rotation may start: a focal length and each row's rotation, from pairs of neighbouring
-/// rows, by the focal length that makes them rotations best. None: too few shared points.
+/// Initial guess for a log without measured rotation: a focal length and each row's rotation, from neighbouring pairs
+/// of rows, by the focal length that makes them rotations best. None: too few shared points.
 struct FreeRotationStart {
   double focal = 1.0;  ///< Normalised, square pixels, centred.
   std::vector<Eigen::Quaterniond> cam_from_start;

@@ -7,8 +7,8 @@
 #include "alidade/geometry/so3.h"
 #include "alidade/observe/filters/fang_observer.h"
 #include "alidade/observe/filters/flow_filter.h"
+#include "alidade/observe/filters/frame_variation.h"
 #include "alidade/observe/filters/hybrid.h"
-#include "alidade/observe/filters/steadiness.h"
 #include "alidade/observe/solve/solve_once.h"
 #include "alidade/observe/solve/start_roll.h"
 
@@ -128,10 +128,10 @@ class Observation {
     if (!observer.is_running()) return;
     observer.settle();
     report_.sigma_px = observer.sigma_px();
-    const HybridObserver::Rest rest = observer.longest_rest();
-    report_.reference_from_s = rest.from_s;
-    report_.reference_until_s = rest.until_s;
-    rests_at_end_ = rest.is_current;
+    const HybridObserver::ConstantSpan span = observer.longest_constant_span();
+    report_.reference_from_s = span.from_s;
+    report_.reference_until_s = span.until_s;
+    constant_at_end_ = span.is_current;
     final_ = observer.filter().camera();
     const double noise = observer.sigma_px() / report_.scale.scale;
     const double ratio = config_.sigma_px ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
@@ -251,14 +251,14 @@ class Observation {
     AdjustConfig config = adjust_config_of(log_, config_, start_, report_.scale);
     if (has_final_ && config_.method != ObserveMethod::fang2011) {
       config.start = final_;
-      config.start.turn_rad.setZero();
+      config.start.rotation_error_rad.setZero();
       config.other_starts.clear();
     }
     report_.reference = adjust(buffer, config, progress_);
     if (!report_.reference.has_value) return;
     report_.pixels_rejected = report_.reference.num_rejected;
     if (config_.rotation == RotationKnowledge::known) {
-      report_.jitter = turn_jitter(report_.reference);
+      report_.jitter = rotation_jitter(report_.reference);
       report_.stated = stated_covariance(report_.reference, config.nuisances);
       report_.causes = cause_scores(
           log_, report_.reference,
@@ -274,14 +274,14 @@ class Observation {
   }
 
   /// Are the rows that the answer rests on of one focal length?
-  [[nodiscard]] bool is_unsteady() const {
+  [[nodiscard]] bool focal_length_varies() const {
     return config_.rotation == RotationKnowledge::known && report_.reference.has_value &&
-           steadiness_of(report_.reference.bundle, report_.reference.solution).is_unsteady();
+           focal_variation_of(report_.reference.bundle, report_.reference.solution).is_significant();
   }
 
   void conclude() {
-    if (is_unsteady()) {
-      report_.status = ObserveSolution::Status::unsteady;
+    if (focal_length_varies()) {
+      report_.status = ObserveSolution::Status::focal_length_varies;
       return;
     }
     if (!has_final_ || !report_.reference.has_value) {
@@ -334,7 +334,7 @@ class Observation {
 
   /// Where both are of one camera: the reference says whether the answer is as good as its σ.
   void compare_with_reference() {
-    const bool is_of_end = rests_at_end_ || report_.reference_until_s >= frames_.back().t_s - 1e-6;
+    const bool is_of_end = constant_at_end_ || report_.reference_until_s >= frames_.back().t_s - 1e-6;
     if (!is_of_end || config_.method == ObserveMethod::batch) return;
     const Eigen::Vector4d difference = final_.k - report_.reference.solution.camera.k;
     const Eigen::Vector4d of_reference = CommonMatrix(report_.stated.cov).diagonal().head<4>();
@@ -379,7 +379,7 @@ class Observation {
   ObserveSolution report_;
   std::vector<RotationFrame> frames_;
   bool free_started_ = false, has_final_ = false;
-  bool rests_at_end_ = false;  ///< The intrinsics that the reference is of last to the end of the log.
+  bool constant_at_end_ = false;  ///< The intrinsics that the reference is of last to the end of the log.
   RotatingCamera start_, final_;
   CommonMatrix final_cov_, model_cov_;
 };

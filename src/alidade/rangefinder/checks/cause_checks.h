@@ -11,7 +11,7 @@ namespace alidade {
 }
 
 /// What else could be wrong, each tested by itself: the scale of the readings and their unit, the camera's focal length
-/// and centre, a σ of spots that hangs on distance, readings that scatter as no rangefinder's do.
+/// and centre, a σ of spots that depends on distance, readings that scatter as no rangefinder's do.
 void add_cause_checks(const RangefinderReport& report, std::span<const Shot> shots, const RangefinderConfig& config,
                       Verdict& verdict);
 

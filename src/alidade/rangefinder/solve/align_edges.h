@@ -14,7 +14,7 @@ namespace alidade {
 [[nodiscard]] EdgesReport align_edges(std::span<const ScanRow> scan, const GreyImage& photo, const Camera& camera,
                                       const Beam& start, const EdgesConfig& config = {}, const Progress& progress = {});
 
-/// What such an answer is worth: never better than care.
+/// The verdict on such an estimate: never better than care.
 [[nodiscard]] Verdict edges_verdict(const EdgesReport& report);
 
 }  // namespace alidade

@@ -16,7 +16,7 @@ struct SolvedPart {
 [[nodiscard]] Eigen::VectorXd gradient_of(const ReducedSystem& system, const LensPrior& prior, const Camera& camera);
 
 /// Square and scale, focal length, centre and fixed distortion, flatness of the board: by how much each moves the beam,
-/// and what the shots ask for. `camera`: as given. C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948 (the score test).
+/// and its score test. `camera`: as given. C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948 (the score test).
 [[nodiscard]] std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const SolvedPart& part,
                                                           const LensPrior& prior, const Camera& camera,
                                                           std::span<const Eigen::Vector3d> points_in_board,

@@ -23,8 +23,8 @@ struct ViewConfig {
 /// What is wrong with the config, one sentence each; empty where it is usable.
 [[nodiscard]] std::vector<std::string> faults(ViewConfig config);
 
-/// How well it is known where the cameras stand to each other (of one head: its camera after a rotation), the worst
-/// over the angles at which the heads can look.
+/// σ of the cameras' relative pose (of one head: of its camera after a rotation), the worst over the angles at which
+/// the heads can look.
 struct RigSigma {
   double angle_rad = 0.0, length_m = 0.0;
 };
@@ -49,8 +49,8 @@ struct ViewPlan {
 };
 
 /// The view that lowers the uncertainty most, by the information matrix of heads and boards: of the boards where they
-/// stand, or at a new placement, seen there three times. Throws ConfigError for a config that cannot be, or a rig that
-/// did not converge. Fedorov 1972 (sequential design).
+/// stand, or at a new placement, seen there three times. Throws ConfigError for an invalid config, or a rig that did
+/// not converge. Fedorov 1972 (sequential design).
 [[nodiscard]] ViewPlan plan_view(const RigCalibration& now, const ViewConfig& config = {});
 
 ALIDADE_PUBLIC_END

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// What one axis has to act on, at one sample.
+/// Input of the controller of one axis at one sample.
 struct AxisInput {
   double encoder_rad = 0.0;
   double error_rad = 0.0;  ///< Of the newest image: focal-normalised offset of the target, > 0 towards + angle.

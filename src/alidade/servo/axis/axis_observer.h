@@ -6,8 +6,8 @@
 
 namespace alidade {
 
-/// What an axis does beside what its model says: angle, rate, and the command that the difference amounts to, from its
-/// encoder; the gains are the stationary Kalman filter's. That makes a controller free of offset where gain or time
+/// Disturbance observer of an axis: angle, rate, and the input disturbance that explains the difference from its model,
+/// from its encoder; gains of the stationary Kalman filter. That makes a controller free of offset where gain or time
 /// constant are not as known. G. Pannocchia & J. B. Rawlings, "Disturbance models for offset-free model-predictive
 /// control", 2003.
 class AxisObserver {

@@ -4,7 +4,7 @@
 
 namespace alidade {
 
-/// By how much a small offset of an axis from a target at rest shrinks in each period, its controller assuming the axis
+/// Factor by which a small offset of an axis from a static target changes per period, its controller assuming the axis
 /// `known` while it is `real`, and images arriving `latency_s` late: below 1 the loop is stable, above it the
 /// offset grows. Simulated with the controller itself, without noise, for as long as it takes to decide;
 /// 1 where the offset neither shrinks nor grows. Dead band, backlash and stops are not modelled: within them an axis

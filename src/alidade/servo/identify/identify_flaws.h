@@ -23,7 +23,7 @@ struct ServoFlaw {
 /// Response − readings.
 [[nodiscard]] Eigen::VectorXd flawed_misfit(std::span<const ServoSample> log, const ServoFit& fit);
 
-/// Levenberg–Marquardt over parameters and freed flaws. Returns what is left of the squares.
+/// Levenberg–Marquardt over parameters and freed flaws. Returns the sum of squared residuals.
 double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& fit);
 
 /// Rows that do not share errors: of an AR(1) noise with the residuals' correlation from row to row.

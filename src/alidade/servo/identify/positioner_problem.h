@@ -31,7 +31,7 @@ class PositionerProblem {
 
   /// The encoder is sampled so often from that time on; readings are of its samples.
   void set_sampling(double period_s, double phase_s, const PositionerVector& theta);
-  /// Looks for a sampling in what is left; false: none.
+  /// Searches the residuals for the encoder's sampling; false: none.
   bool find_sampling(const PositionerVector& theta, double& period_s, double& phase_s) const;
 
   [[nodiscard]] const std::vector<PositionerReading>& readings() const { return readings_; }

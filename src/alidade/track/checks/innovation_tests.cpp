@@ -52,9 +52,9 @@ HeadInnovations finished(const Sums& sums) {
   if (given.num == 0) return given;
   given.mean /= num;
   given.along = sums.num_along > 0.0 ? given.along / sums.num_along : 0.0;
-  given.place = sums.slope.cwiseQuotient(sums.slope2.cwiseMax(1e-9));
-  given.place_num = sums.slope2.minCoeff();
-  given.colour = sums.power > 0.0 ? sums.lagged / sums.power : 0.0;
+  given.position_slope = sums.slope.cwiseQuotient(sums.slope2.cwiseMax(1e-9));
+  given.position_squares = sums.slope2.minCoeff();
+  given.autocorrelation = sums.power > 0.0 ? sums.lagged / sums.power : 0.0;
   given.nis_per_dof = sums.nis / (2.0 * num);
   return given;
 }

@@ -5,12 +5,12 @@
 namespace alidade {
 namespace {
 
-bool has_course(std::span<const LensCourse> courses, std::size_t head) {
-  return head < courses.size() && !courses[head].lens.empty();
+bool has_history(std::span<const IntrinsicsHistory> histories, std::size_t head) {
+  return head < histories.size() && !histories[head].lens.empty();
 }
 
 /// σ of fx, fy, cx, cy as the camera's own intrinsics would have it: what moves its pixels as far in the image.
-Eigen::Vector4d sigma_in_own(const Camera& camera, const LensNow& now) {
+Eigen::Vector4d sigma_in_own(const Camera& camera, const IntrinsicsSample& now) {
   const Eigen::Vector2d ratio = Zoomed(camera, now.k).ratio;
   return now.sigma.cwiseQuotient(Eigen::Vector4d(ratio.x(), ratio.y(), ratio.x(), ratio.y()));
 }
@@ -24,28 +24,29 @@ void replace_lens(Eigen::MatrixXd& cov, Eigen::Index first, const Eigen::Vector4
 
 }  // namespace
 
-std::optional<OutsideCourse> outside_course(std::span<const TargetObservation> observations,
-                                            std::span<const LensCourse> courses, double beyond_s) {
+std::optional<OutsideHistory> outside_history(std::span<const TargetObservation> observations,
+                                              std::span<const IntrinsicsHistory> histories, double beyond_s) {
   for (const TargetObservation& observation : observations) {
-    if (!has_course(courses, observation.head)) continue;
-    const LensCourse& course = courses[observation.head];
-    if (observation.t_capture_s < course.from_s - beyond_s || observation.t_capture_s > course.until_s + beyond_s)
-      return OutsideCourse{observation.head, observation.t_capture_s};
+    if (!has_history(histories, observation.head)) continue;
+    const IntrinsicsHistory& history = histories[observation.head];
+    if (observation.t_capture_s < history.from_s - beyond_s || observation.t_capture_s > history.until_s + beyond_s)
+      return OutsideHistory{observation.head, observation.t_capture_s};
   }
   return std::nullopt;
 }
 
-void use_courses(std::span<const LensCourse> courses, std::vector<TargetObservation>& observations, Rig& rig) {
+void use_intrinsics_histories(std::span<const IntrinsicsHistory> histories,
+                              std::vector<TargetObservation>& observations, Rig& rig) {
   Eigen::Index first = num_head_params * static_cast<Eigen::Index>(rig.heads.size());
   for (std::size_t h = 0; h < rig.heads.size(); ++h) {
     Camera& camera = rig.heads[h].camera;
     const Eigen::Index num = params(camera.lens).size();
-    if (has_course(courses, h)) {
+    if (has_history(histories, h)) {
       Eigen::Vector4d sum2 = Eigen::Vector4d::Zero();
       double count = 0.0;
       for (TargetObservation& observation : observations) {
         if (observation.head != h) continue;
-        const LensNow now = courses[h].at(observation.t_capture_s);
+        const IntrinsicsSample now = histories[h].at(observation.t_capture_s);
         const Eigen::Vector4d sigma = sigma_in_own(camera, now);
         observation.lens = ObservationLens{now.k, sigma};
         sum2 += sigma.cwiseAbs2();

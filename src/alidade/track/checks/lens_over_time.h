@@ -8,17 +8,19 @@
 
 namespace alidade {
 
-/// An observation of which a head's course of intrinsics says nothing: more than `beyond_s` outside what it spans.
-struct OutsideCourse {
+/// An observation of which a head's history of intrinsics says nothing: more than `beyond_s` outside what it spans.
+struct OutsideHistory {
   std::size_t head = 0;
   double t_s = 0.0;
 };
-[[nodiscard]] std::optional<OutsideCourse> outside_course(std::span<const TargetObservation> observations,
-                                                          std::span<const LensCourse> courses, double beyond_s);
+[[nodiscard]] std::optional<OutsideHistory> outside_history(std::span<const TargetObservation> observations,
+                                                            std::span<const IntrinsicsHistory> histories,
+                                                            double beyond_s);
 
 /// Gives each observation the intrinsics of its capture, and the rig's lenses the errors that these have: as an
-/// observer's errors last, they are considered as persistent errors that change in size only. Heads without a course
+/// observer's errors last, they are considered as persistent errors that change in size only. Heads without a history
 /// keep their own.
-void use_courses(std::span<const LensCourse> courses, std::vector<TargetObservation>& observations, Rig& rig);
+void use_intrinsics_histories(std::span<const IntrinsicsHistory> histories,
+                              std::vector<TargetObservation>& observations, Rig& rig);
 
 }  // namespace alidade

@@ -86,7 +86,7 @@ struct ZoomingTrack {
   std::vector<TargetObservation> observations;
   Rig rig;
   TrueTrack truth;
-  std::vector<LensCourse> courses;
+  std::vector<IntrinsicsHistory> histories;
 };
 
 /// `off`: by how many σ the given focal lengths are off, of each head.
@@ -96,30 +96,31 @@ ZoomingTrack zooming_track(std::uint64_t seed, double sigma_share, const Eigen::
   track.rig.heads = scene.heads;
   const auto num = num_head_params * static_cast<Eigen::Index>(scene.heads.size());
   track.rig.cov.setZero(num, num);
-  track.courses.resize(2);
+  track.histories.resize(2);
   for (int k = 0; k <= 100; ++k) {
     const double t_s = 0.1 * k;
     for (std::size_t h = 0; h < 2; ++h) {
       const Eigen::Vector4d own = own_lens(scene.heads[h].camera).k;
       const double factor = std::exp((h == 0 ? 0.7 : -0.7) * std::sin(0.6 * t_s));
-      LensNow now;
+      IntrinsicsSample now;
       now.k << factor * own.head<2>(), own.tail<2>();
       now.sigma << sigma_share * now.k.head<2>(), 0.0, 0.0;
-      track.courses[h].t_s.push_back(t_s);
-      track.courses[h].lens.push_back(now);
+      track.histories[h].t_s.push_back(t_s);
+      track.histories[h].lens.push_back(now);
     }
   }
-  for (LensCourse& course : track.courses) course.until_s = 10.0;
+  for (IntrinsicsHistory& history : track.histories) history.until_s = 10.0;
   for (const SimulatedObservation& s : simulate_track(scene, seed)) {
     // What was drawn with the own lens, seen larger; the noise too, which is given.
-    const LensNow now = track.courses[s.head].at(s.t_capture_s);
+    const IntrinsicsSample now = track.histories[s.head].at(s.t_capture_s);
     const Zoomed zoomed(scene.heads[s.head].camera, now.k);
     TargetObservation observation{s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, zoomed.px(s.px), 0.0, {}};
     observation.sigma_px = scene.sigma_px * zoomed.ratio.x();
     track.observations.push_back(observation);
   }
   for (std::size_t h = 0; h < 2; ++h)
-    for (LensNow& now : track.courses[h].lens) now.k.head<2>() *= 1.0 + sigma_share * off[static_cast<Eigen::Index>(h)];
+    for (IntrinsicsSample& now : track.histories[h].lens)
+      now.k.head<2>() *= 1.0 + sigma_share * off[static_cast<Eigen::Index>(h)];
   for (int k = 0; k <= 2000; ++k) {
     track.truth.t_s.push_back(k / 200.0);
     track.truth.position.push_back(scene.position(k / 200.0));
@@ -140,7 +141,7 @@ TrackReport tracked(ZoomingTrack& track, double sigma_a) {
 TEST(LensOverTime, IsFollowedAsIfNothingZoomed) {
   const double sigma_a = track_scenario("B")->sigma_a_m_s2;
   ZoomingTrack zooming = zooming_track(3, 0.0, Eigen::Vector2d::Zero()), blind = zooming;
-  use_courses(zooming.courses, zooming.observations, zooming.rig);
+  use_intrinsics_histories(zooming.histories, zooming.observations, zooming.rig);
   const TrackReport known = tracked(zooming, sigma_a), unknown = tracked(blind, sigma_a);
   EXPECT_LT(known.rms_m, 1.1 * known.pcrlb_m);
   EXPECT_LT(known.rms_m, 0.0045);
@@ -156,10 +157,10 @@ TEST(LensOverTime, SigmaOfTheIntrinsicsIsCounted) {
     Draws draws(50 + run);
     const Eigen::Vector2d off = draws.normal2();
     ZoomingTrack zooming = zooming_track(run, 0.02, off), trusting = zooming;
-    use_courses(zooming.courses, zooming.observations, zooming.rig);
-    for (LensCourse& course : trusting.courses)
-      for (LensNow& now : course.lens) now.sigma.setZero();
-    use_courses(trusting.courses, trusting.observations, trusting.rig);
+    use_intrinsics_histories(zooming.histories, zooming.observations, zooming.rig);
+    for (IntrinsicsHistory& history : trusting.histories)
+      for (IntrinsicsSample& now : history.lens) now.sigma.setZero();
+    use_intrinsics_histories(trusting.histories, trusting.observations, trusting.rig);
     counted += tracked(zooming, sigma_a).nees_per_dof / num_runs;
     exact += tracked(trusting, sigma_a).nees_per_dof / num_runs;
   }
@@ -172,14 +173,14 @@ TEST(LensOverTime, SigmaOfTheIntrinsicsIsCounted) {
 
 TEST(LensOverTime, SaysWhichObservationNoCourseTellsOf) {
   ZoomingTrack zooming = zooming_track(3, 0.01, Eigen::Vector2d::Zero());
-  EXPECT_FALSE(outside_course(zooming.observations, zooming.courses, 1.0));
-  zooming.courses[1].until_s = 4.0;
-  const auto outside = outside_course(zooming.observations, zooming.courses, 1.0);
+  EXPECT_FALSE(outside_history(zooming.observations, zooming.histories, 1.0));
+  zooming.histories[1].until_s = 4.0;
+  const auto outside = outside_history(zooming.observations, zooming.histories, 1.0);
   ASSERT_TRUE(outside);
   EXPECT_EQ(outside->head, 1u);
   EXPECT_GT(outside->t_s, 5.0);
-  zooming.courses[1].lens.clear();  // a head without a course
-  EXPECT_FALSE(outside_course(zooming.observations, zooming.courses, 1.0));
+  zooming.histories[1].lens.clear();  // a head without a history
+  EXPECT_FALSE(outside_history(zooming.observations, zooming.histories, 1.0));
 }
 
 }  // namespace

@@ -120,7 +120,7 @@ struct Lean {
 };
 
 /// A target that --method describes badly leans, too, by up to half of these: see scenario C.
-constexpr double min_mean = 0.4, min_along = 0.6, min_place = 1.2;
+constexpr double min_mean = 0.4, min_along = 0.6, min_slope = 1.2;
 
 void take_if_worse(std::string text, double size, double least, double z, Lean& worst) {
   constexpr double min_z = 6.0;
@@ -136,8 +136,8 @@ void take_worst_of(const HeadInnovations& of, const std::string& head, Lean& wor
                       ": its mounting or an encoder's zero",
                   of.mean[k], min_mean, root * of.mean[k], worst);
     take_if_worse("the innovations of " + head + " grow with the position in the image, by " +
-                      text_of(std::abs(of.place[k]), 2) + "σ a quarter of it: its focal length, or a scale",
-                  of.place[k], min_place, of.place[k] * std::sqrt(of.place_num), worst);
+                      text_of(std::abs(of.position_slope[k]), 2) + "σ a quarter of it: its focal length, or a scale",
+                  of.position_slope[k], min_slope, of.position_slope[k] * std::sqrt(of.position_squares), worst);
   }
   take_if_worse(head + " sees the target " + (of.along > 0.0 ? "ahead of" : "behind") + " where it is expected, by " +
                     text_of(std::abs(of.along), 2) +

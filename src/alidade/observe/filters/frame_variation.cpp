@@ -1,10 +1,10 @@
-#include "alidade/observe/filters/steadiness.h"
+#include "alidade/observe/filters/frame_variation.h"
 
 #include <algorithm>
 
 namespace alidade {
 
-Steadiness steadiness_of(const RotationBundle& bundle, const BundleSolution& solution) {
+FocalVariation focal_variation_of(const RotationBundle& bundle, const BundleSolution& solution) {
   struct Sums {
     double along = 0.0, length = 0.0, squares = 0.0;
     int num = 0;
@@ -61,7 +61,7 @@ std::vector<FrameSums> sums_by_frame(const Adjustment& reference) {
 
 }  // namespace
 
-TurnJitter turn_jitter(const Adjustment& reference) {
+RotationJitter rotation_jitter(const Adjustment& reference) {
   const std::vector<FrameSums> frames = sums_by_frame(reference);
   double explained = 0.0, left = 0.0, left_dof = 0.0, points = 0.0, to_next = 0.0, squares = 0.0;
   for (std::size_t k = 0; k < frames.size(); ++k) {

@@ -1,4 +1,4 @@
-#include "alidade/pantilt/lens_course.h"
+#include "alidade/pantilt/intrinsics_history.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +14,8 @@ Eigen::Vector4d intrinsics_of(const Lens& lens) {
 
 }  // namespace
 
-LensNow own_lens(const Camera& camera) {
-  LensNow now;
+IntrinsicsSample own_lens(const Camera& camera) {
+  IntrinsicsSample now;
   now.k = intrinsics_of(camera.lens);
   if (camera.cov.rows() >= 4) now.sigma = camera.cov.diagonal().head<4>().cwiseMax(0.0).cwiseSqrt();
   return now;
@@ -27,7 +27,7 @@ Zoomed::Zoomed(const Camera& camera, const Eigen::Vector4d& k) : centre(k.tail<2
   ratio = k.head<2>().cwiseQuotient(own.head<2>());
 }
 
-LensNow LensCourse::at(double at_s) const {
+IntrinsicsSample IntrinsicsHistory::at(double at_s) const {
   const auto after = std::ranges::lower_bound(t_s, at_s);
   if (after == t_s.begin()) return lens.front();
   if (after == t_s.end()) return lens.back();

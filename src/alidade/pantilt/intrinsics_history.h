@@ -7,19 +7,19 @@
 #include "alidade/camera/camera.h"
 #include "alidade/public.h"
 
-// A lens that zooms: intrinsics that change while a head works, estimated by an observer, or true.
+// A lens that zooms: intrinsics as a function of time, estimated by an observer, or true.
 
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// Intrinsics of a camera at one instant: fx, fy, cx, cy, and σ of each. [px]
-struct LensNow {
+struct IntrinsicsSample {
   Eigen::Vector4d k = Eigen::Vector4d::Zero();
   Eigen::Vector4d sigma = Eigen::Vector4d::Zero();
 };
 
 /// The intrinsics of a camera file, with its σ; without a covariance zero.
-[[nodiscard]] LensNow own_lens(const Camera& camera);
+[[nodiscard]] IntrinsicsSample own_lens(const Camera& camera);
 
 /// From a camera's own intrinsics to others, its skew and distortion about them: px = c + (f / f_own) (px_own − c_own).
 struct Zoomed {
@@ -36,14 +36,14 @@ struct Zoomed {
 };
 
 /// Intrinsics over time, as `alidade observe` estimates them of a head's camera.
-struct LensCourse {
+struct IntrinsicsHistory {
   std::string name;                    ///< Of the file, for messages.
   std::vector<double> t_s;             ///< Ascending.
-  std::vector<LensNow> lens;           ///< One per time; none where the camera's own intrinsics are used.
+  std::vector<IntrinsicsSample> lens;  ///< One per time; none where the camera's own intrinsics are used.
   double from_s = 0.0, until_s = 0.0;  ///< What the observer's log spans.
 
   /// Linear between the times, constant before the first and after the last.
-  [[nodiscard]] LensNow at(double at_s) const;
+  [[nodiscard]] IntrinsicsSample at(double at_s) const;
 };
 
 ALIDADE_PUBLIC_END

@@ -6,8 +6,8 @@
 #include "alidade/localize/filter/feature.h"
 
 // No measurement but that of known points determines how the world is rotated about its origin: camera, speed and map
-// may rotate together. A filter whose derivatives follow its estimate forgets that: those of one update belong to
-// another world than those of the next, and between them it gains certainty that no measurement gave (S. J. Julier & J.
+// may rotate together. An EKF, linearised at its changing estimate, loses that: the unobservable direction differs from
+// one update to the next, and so it gains information that no measurement gave (S. J. Julier & J.
 // K. Uhlmann, "A Counter Example to the Theory of SLAM", ICRA 2001). So errors are counted as in the right-invariant
 // filter (A. Barrau & S. Bonnabel, "An EKF-SLAM Algorithm with Consistency Properties", 2015): with the rotation ξ = R̂
 // δθ of the world, G = exp(ξ), and the error δ of a position p̂,
@@ -23,13 +23,13 @@
 
 namespace alidade {
 
-/// The rotation of the world that a right rotation error of the camera stands for.
-class WorldTurn {
+/// The rotation of the world that corresponds to a right rotation error of the camera.
+class WorldRotation {
  public:
-  WorldTurn(const Rigid3& world_from_cam, const Eigen::Vector3d& rotation_error);
+  WorldRotation(const Rigid3& world_from_cam, const Eigen::Vector3d& rotation_error);
 
-  /// The bracket above.
-  [[nodiscard]] Eigen::Vector3d place_before(const Eigen::Vector3d& place, const Eigen::Vector3d& error) const {
+  /// p̂ + δ + p̂ × ξ, the bracket above.
+  [[nodiscard]] Eigen::Vector3d position_before(const Eigen::Vector3d& place, const Eigen::Vector3d& error) const {
     return place + error + place.cross(xi_);
   }
   /// A feature with its error (dim() components), before the world rotates.
@@ -41,7 +41,7 @@ class WorldTurn {
   /// A feature, as feature_before() gives it, rotated.
   [[nodiscard]] static Feature turned(const Eigen::Matrix3d& G, const Feature& before);
   /// Of an inverse depth: derivative of θ, φ, ρ after the rotation by those of feature_before().
-  [[nodiscard]] Eigen::Matrix3d J_turned_angles(const Feature& feature, std::span<const double> error) const;
+  [[nodiscard]] Eigen::Matrix3d J_rotated_angles(const Feature& feature, std::span<const double> error) const;
 
  private:
   Eigen::Matrix3d world_from_cam_;
@@ -49,6 +49,6 @@ class WorldTurn {
 };
 
 /// Derivative of feature_before() by ξ: [p̂]×, and minus what a rotation does to the angles. The first dim() rows.
-[[nodiscard]] Eigen::Matrix<double, 6, 3> J_before_turn(const Feature& feature);
+[[nodiscard]] Eigen::Matrix<double, 6, 3> J_before_rotation(const Feature& feature);
 
 }  // namespace alidade

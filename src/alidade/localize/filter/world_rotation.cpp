@@ -1,4 +1,4 @@
-#include "alidade/localize/filter/world_turn.h"
+#include "alidade/localize/filter/world_rotation.h"
 
 #include <Eigen/Geometry>
 
@@ -15,21 +15,21 @@ Eigen::Matrix<double, 2, 3> J_angles_turn(const BearingAngles& bearing) {
 
 }  // namespace
 
-WorldTurn::WorldTurn(const Rigid3& world_from_cam, const Eigen::Vector3d& rotation_error)
+WorldRotation::WorldRotation(const Rigid3& world_from_cam, const Eigen::Vector3d& rotation_error)
     : world_from_cam_(world_from_cam.rotation.toRotationMatrix()), xi_(world_from_cam_ * rotation_error) {}
 
-Eigen::Matrix3d WorldTurn::G() const { return exp_so3(xi_).toRotationMatrix(); }
+Eigen::Matrix3d WorldRotation::G() const { return exp_so3(xi_).toRotationMatrix(); }
 
-Feature WorldTurn::feature_before(const Feature& feature, std::span<const double> error) const {
+Feature WorldRotation::feature_before(const Feature& feature, std::span<const double> error) const {
   Feature before = feature;
-  before.values.head<3>() = place_before(feature.values.head<3>(), Eigen::Map<const Eigen::Vector3d>(error.data()));
+  before.values.head<3>() = position_before(feature.values.head<3>(), Eigen::Map<const Eigen::Vector3d>(error.data()));
   if (feature.kind == FeatureKind::xyz) return before;
   before.values.tail<3>() += Eigen::Map<const Eigen::Vector3d>(error.data() + 3);
   before.values.segment<2>(3) -= J_angles_turn(bearing_of(feature.values[3], feature.values[4])) * xi_;
   return before;
 }
 
-Eigen::Matrix3d WorldTurn::J_turned_angles(const Feature& feature, std::span<const double> error) const {
+Eigen::Matrix3d WorldRotation::J_rotated_angles(const Feature& feature, std::span<const double> error) const {
   const Feature before = feature_before(feature, error);
   const BearingAngles was = bearing_of(before.values[3], before.values[4]);
   const Eigen::Matrix3d G = this->G();
@@ -40,7 +40,7 @@ Eigen::Matrix3d WorldTurn::J_turned_angles(const Feature& feature, std::span<con
   return J;
 }
 
-Feature WorldTurn::turned(const Eigen::Matrix3d& G, const Feature& before) {
+Feature WorldRotation::turned(const Eigen::Matrix3d& G, const Feature& before) {
   Feature feature = before;
   feature.values.head<3>() = G * before.values.head<3>();
   if (before.kind == FeatureKind::xyz) return feature;
@@ -50,7 +50,7 @@ Feature WorldTurn::turned(const Eigen::Matrix3d& G, const Feature& before) {
   return feature;
 }
 
-Eigen::Matrix<double, 6, 3> J_before_turn(const Feature& feature) {
+Eigen::Matrix<double, 6, 3> J_before_rotation(const Feature& feature) {
   Eigen::Matrix<double, 6, 3> J = Eigen::Matrix<double, 6, 3>::Zero();
   J.topRows<3>() = cross_matrix(feature.values.head<3>());
   if (feature.kind == FeatureKind::inverse_depth)

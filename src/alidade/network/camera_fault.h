@@ -13,9 +13,10 @@ namespace alidade {
 using PlaceCameras = std::function<MovingTargetReport(const std::vector<TargetObservation>& observations,
                                                       const std::vector<RigHead>& heads, bool searches)>;
 
-/// Which camera it is whose images are mirrored, or which two have each other's lens: undone, all cameras agree where
-/// they did not. One sentence; empty where nothing is amiss, or none of these explains it.
-[[nodiscard]] std::string culprit_of(const MovingTargetReport& report, std::span<const TargetObservation> observations,
-                                     std::span<const RigHead> heads, const PlaceCameras& place);
+/// Names a camera whose images are mirrored, or two cameras whose lenses are exchanged: where undoing that makes all
+/// cameras agree. One sentence; empty where nothing is wrong, or none of these explains it.
+[[nodiscard]] std::string camera_fault_of(const MovingTargetReport& report,
+                                          std::span<const TargetObservation> observations,
+                                          std::span<const RigHead> heads, const PlaceCameras& place);
 
 }  // namespace alidade

@@ -1,4 +1,4 @@
-#include "alidade/network/moving_culprit.h"
+#include "alidade/network/camera_fault.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +22,7 @@ Agreement agreement_of(const MovingTargetReport& report) {
   Agreement agreement;
   if (report.status != PlacedStatus::placed && report.status != PlacedStatus::no_scale) return agreement;
   double sum2 = 0.0;
-  for (const PlacedCamera& camera : report.cameras) {
+  for (const LocatedCamera& camera : report.cameras) {
     if (!camera.placed) continue;
     ++agreement.num_placed;
     sum2 += camera.sigma_px * camera.sigma_px;
@@ -36,7 +36,7 @@ Agreement agreement_of(const MovingTargetReport& report) {
 bool is_doubtful(const MovingTargetReport& report) {
   constexpr double usual_rad = 0.2 * degree;
   if (report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits) return false;
-  const bool all_located = std::ranges::all_of(report.cameras, &PlacedCamera::placed);
+  const bool all_located = std::ranges::all_of(report.cameras, &LocatedCamera::placed);
   const bool is_solved = report.status == PlacedStatus::placed || report.status == PlacedStatus::no_scale;
   return !is_solved || !all_located || report.sigma_relative_rad > usual_rad;
 }
@@ -100,8 +100,8 @@ std::string name_of(const RigHead& head) { return std::to_string(head.head.id); 
 
 }  // namespace
 
-std::string culprit_of(const MovingTargetReport& report, std::span<const TargetObservation> observations,
-                       std::span<const RigHead> heads, const PlaceCameras& place) {
+std::string camera_fault_of(const MovingTargetReport& report, std::span<const TargetObservation> observations,
+                            std::span<const RigHead> heads, const PlaceCameras& place) {
   const bool doubtful = is_doubtful(report);
   if (observations.empty() || report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits)
     return "";

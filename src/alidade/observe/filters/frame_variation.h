@@ -1,0 +1,33 @@
+#pragma once
+
+#include "alidade/observe/frame_buffer.h"
+
+namespace alidade {
+
+/// F test: how much of a bundle's residuals a separate focal length for each frame would explain.
+struct FocalVariation {
+  double share = 0.0;    ///< Of the squared residuals: 1 is all.
+  double f_ratio = 0.0;  ///< Explained per frame over residual per degree of freedom: 1 by chance.
+
+  /// The focal length varies: constant intrinsics are not a valid model, however small their σ.
+  [[nodiscard]] bool is_significant() const { return share > 0.6 && f_ratio > 8.0; }
+};
+
+/// The residual of a frame along ∂px/∂(log f) = px − c, for each frame that sees two points or more.
+/// With distortion or a wrong mount the share stays small; with a zoom only noise remains.
+[[nodiscard]] FocalVariation focal_variation_of(const RotationBundle& bundle, const BundleSolution& solution);
+
+/// F test: how much of an adjustment's residuals a separate rotation for each frame would explain.
+struct RotationJitter {
+  double f_ratio = 0.0;        ///< Explained per frame over residual per degree of freedom: 1 by chance.
+  double variance_rad2 = 0.0;  ///< Of a rotation about an axis across the view, beyond chance.
+  double lasts = 0.0;          ///< Correlation from frame to frame: 0 for noise, larger for model errors.
+
+  [[nodiscard]] bool is_noise() const { return lasts < 0.5; }
+};
+
+/// From the mean residual of each frame that sees four points or more: a small rotation across the view moves all
+/// alike.
+[[nodiscard]] RotationJitter rotation_jitter(const Adjustment& reference);
+
+}  // namespace alidade

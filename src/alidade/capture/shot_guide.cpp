@@ -6,6 +6,7 @@
 
 #include "alidade/capture.h"
 #include "alidade/capture/outline.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/rangefinder.h"
 
 namespace alidade {
@@ -18,7 +19,7 @@ std::string farther_side(double azimuth_rad) {
 }
 
 std::string words_of_shot(double distance_m, double tilt_rad, double azimuth_rad) {
-  const double tilt_deg = tilt_rad * 180.0 / std::numbers::pi;
+  const double tilt_deg = tilt_rad / degree;
   if (tilt_deg < 5.0) return fmt::format("{:.1f} m away, facing the camera", distance_m);
   return fmt::format("{:.1f} m away, tilted by {:.0f}°, the {} side farther", distance_m, tilt_deg,
                      farther_side(azimuth_rad));
@@ -27,7 +28,7 @@ std::string words_of_shot(double distance_m, double tilt_rad, double azimuth_rad
 /// Near and far, tilted to each side in turn: what no shots determine together is where all are alike.
 std::string words_of_start(std::size_t shot, const ShotConfig& where) {
   const double far_share = shot % 3 == 0 ? 0.1 : shot % 3 == 1 ? 0.8 : 0.4;
-  const double tilt_rad = std::min(30.0, where.max_tilt_deg) * std::numbers::pi / 180.0;
+  const double tilt_rad = std::min(30.0, where.max_tilt_deg) * degree;
   return words_of_shot(where.min_range_m + far_share * (where.max_range_m - where.min_range_m), tilt_rad,
                        0.5 * std::numbers::pi * static_cast<double>(shot % 4));
 }

@@ -15,4 +15,9 @@ template <typename Number>
   return *middle;
 }
 
+/// σ of a normal distribution over its median absolute deviation: 1/Φ⁻¹(3/4). F. R. Hampel, JASA 69, 1974.
+inline constexpr double normal_from_mad = 1.4826;
+/// Median length of a vector of two unit normal coordinates (Rayleigh distribution): √(2 ln 2).
+inline constexpr double rayleigh_median = 1.1774100225154747;
+
 }  // namespace alidade

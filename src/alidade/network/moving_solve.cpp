@@ -198,10 +198,10 @@ struct Solver {
     return std::sqrt(given / std::max(0.2 * given, given - taken));
   }
 
-  /// σ of a coordinate, head by head, by the median of the residuals' lengths (Rayleigh's is 1.1774 σ).
-  void tell_noise() {
+  /// σ of a coordinate, head by head, by the median of the residuals' lengths.
+  void estimate_noise() {
     if (problem.sigma_px) return;
-    const double larger = followed() / 1.1774;
+    const double larger = followed() / rayleigh_median;
     std::vector<double> of_heads;
     for (std::size_t h = 0; h < sigma_px.size(); ++h) {
       std::vector<double> lengths;
@@ -218,7 +218,7 @@ struct Solver {
   }
 
   /// What the path accelerates, where observations constrain it: taken from the middle of the loosely constrained path.
-  void tell_bend() {
+  void estimate_acceleration() {
     std::vector<double> bends;
     for (const SolvedObservation& observation : problem.observations) {
       const auto at = state.path.support(state.rig_time(problem, observation.head, observation.t_s));
@@ -244,7 +244,7 @@ struct Solver {
       steps += descend(max_steps, progress);
       const std::vector<double> before = sigma_px;
       (void)system();
-      tell_noise();
+      estimate_noise();
       double change = 0.0;
       for (std::size_t h = 0; h < before.size(); ++h)
         change = std::max(change, std::abs(std::log(sigma_px[h] / before[h])));
@@ -340,10 +340,10 @@ SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start
   // A power of two: what it begins with need not depend on where the path begins.
   solver.bend_weight = std::exp2(std::round(-std::log2(0.3 * extent * start.path.knot_s * start.path.knot_s)));
   (void)solver.system();
-  solver.tell_noise();
+  solver.estimate_noise();
   for (int stage = 0; stage < 3; ++stage) {
     solved.iterations += solver.settle(progress);
-    if (stage < 2) solver.tell_bend();
+    if (stage < 2) solver.estimate_acceleration();
   }
   solver.is_soft = false;
   constexpr int max_rounds = 6, max_steps = 40;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/pantilt/positioner.h"
 
 namespace alidade {
@@ -48,7 +48,7 @@ AxisMotion advanced(const RatePlant& plant, const AxisMotion& motion, double com
 
 }  // namespace
 
-double radians_in(AngleUnit unit) { return unit == AngleUnit::deg ? std::numbers::pi / 180.0 : 1.0; }
+double radians_in(AngleUnit unit) { return unit == AngleUnit::deg ? degree : 1.0; }
 
 std::string_view unit_name(AngleUnit unit) { return unit == AngleUnit::deg ? "deg" : "rad"; }
 

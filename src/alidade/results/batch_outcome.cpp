@@ -123,7 +123,7 @@ DataTable lot_table(const std::vector<BatchRow>& rows) {
     names.push_back(name);
     counts.push_back(static_cast<std::int64_t>(values.size()));
     medians.push_back(median);
-    scatters.push_back(1.4826 * median_of(numbers));
+    scatters.push_back(normal_from_mad * median_of(numbers));
     sigmas.push_back(median_of(own));
   }
   return {"lot",
@@ -186,7 +186,7 @@ std::vector<BatchOutlier> distances_of(const std::vector<BatchRow>& rows) {
     for (const auto& [row, value] : values) numbers.push_back(value.value);
     const double median = median_of(numbers);
     for (double& number : numbers) number = std::abs(number - median);
-    const double scatter = 1.4826 * median_of(numbers);
+    const double scatter = normal_from_mad * median_of(numbers);
     for (const auto& [row, value] : values) {
       const double z = (value.value - median) / std::hypot(scatter, value.sigma);
       // In a batch with identical values, and without σ, any different one is an outlier.

@@ -6,13 +6,12 @@
 #include <functional>
 #include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/pantilt/head_rotation.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade {
 namespace {
-
-constexpr double rad_per_degree = std::numbers::pi / 180.0;
 
 std::uint64_t fleet_seed(std::uint64_t seed, std::uint64_t id, std::uint64_t n) {
   std::uint64_t z = seed * 0x9e3779b97f4a7c15U + id * 0xd1b54a32d192ed03U + n * 0x8cb92ba72f3d8dd7U;
@@ -74,7 +73,7 @@ FleetScene draw_fleet_scene(const FleetSceneConfig& config, std::uint64_t seed, 
     return scene;
   }
   scene.event = static_cast<FleetEvent>(1 + static_cast<int>(4.0 * kind));
-  scene.event_size = scene.event == FleetEvent::focal_drift ? 0.01 + 0.02 * size : (0.1 + 0.9 * size) * rad_per_degree;
+  scene.event_size = scene.event == FleetEvent::focal_drift ? 0.01 + 0.02 * size : (0.1 + 0.9 * size) * degree;
   if (config.slip_sigmas > 0.0) {
     scene.event = FleetEvent::belt_slip;
     scene.event_size = config.slip_sigmas * config.noise_px / scene.fx / 2.0;  // of four points' mean

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade {
@@ -27,8 +28,8 @@ struct Swing {
 
 Swing swing_of(Draws& draws) {
   Swing swing;
-  const double turn_rad = 8.0 * std::numbers::pi / 180.0;
-  swing.amplitude << 0.12, 0.09, 0.10, turn_rad, turn_rad, turn_rad;
+  const double angle_rad = 8.0 * degree;
+  swing.amplitude << 0.12, 0.09, 0.10, angle_rad, angle_rad, angle_rad;
   for (int i = 0; i < 6; ++i) {
     swing.frequency_hz[i] = draws.uniform(0.22, 0.38);
     swing.phase[i] = draws.uniform(0.0, 2.0 * std::numbers::pi);

@@ -12,7 +12,6 @@ namespace alidade {
 namespace {
 
 constexpr float saturated_grey = 251.0F;  // noise of a clipped pixel stays above it
-constexpr double normal_from_mad = 1.4826;
 
 cv::Mat as_mat(Image& image) {
   return {static_cast<int>(image.rows()), static_cast<int>(image.cols()), CV_32F, image.data()};

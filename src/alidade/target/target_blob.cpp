@@ -57,9 +57,8 @@ double noise_of(const cv::Mat& signal) {
   if (signal.cols < 2) return 0.0;
   cv::Mat differences = signal.colRange(1, signal.cols) - signal.colRange(0, signal.cols - 1);
   differences = cv::abs(differences);
-  constexpr double sigma_per_median = 1.4826;
   const double pixels_sigma = 0.5;  // rounding to whole grey values
-  return std::max(pixels_sigma, sigma_per_median * median_of(sample_of(differences)) / std::sqrt(2.0));
+  return std::max(pixels_sigma, normal_from_mad * median_of(sample_of(differences)) / std::sqrt(2.0));
 }
 
 struct Blob {

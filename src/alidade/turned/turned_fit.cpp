@@ -20,7 +20,7 @@ double sigma_by_median(const TurnedFit& fit) {
   std::vector<double> norms = freed_norms(fit.bundle, fit.solution.residuals);
   std::erase_if(norms, [](double norm) { return !std::isfinite(norm); });
   if (norms.empty()) return first_sigma;
-  return std::clamp(median_of(std::move(norms)) / 1.17741, min_sigma, max_sigma);
+  return std::clamp(median_of(std::move(norms)) / rayleigh_median, min_sigma, max_sigma);
 }
 
 /// The same by squares, each residual beyond Huber's bound weighed down.

@@ -9,8 +9,6 @@
 namespace alidade {
 namespace {
 
-constexpr double rayleigh_median = 1.1774100225154747;  // √(2 ln 2): median of |r| for unit normal coordinates
-
 const Eigen::Matrix2d no_cov = Eigen::Matrix2d::Zero();
 
 const Eigen::Matrix2d& own_cov(const Corner& corner, bool use_covariances) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -20,14 +21,7 @@ std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s) {
 
 namespace {
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
-constexpr double sigma_of_median_deviation = 1.4826, rejected_beyond = 4.0;
+constexpr double rejected_beyond = 4.0;  // of their robust σ
 
 /// A reading's depth, and where the camera was.
 struct DepthRow {
@@ -91,7 +85,7 @@ std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, 
     if (!fit) return std::nullopt;
     std::vector<double> sizes;
     for (const DepthRow& row : rows) sizes.push_back(std::abs(row.left));
-    const double limit = rejected_beyond * std::max(1.0, sigma_of_median_deviation * median(std::move(sizes)));
+    const double limit = rejected_beyond * std::max(1.0, normal_from_mad * median_of(std::move(sizes)));
     if (round + 1 < rounds) std::erase_if(rows, [&](const DepthRow& row) { return std::abs(row.left) > limit; });
   }
   const Eigen::Vector3d g = fit->values.head<3>();
@@ -174,11 +168,11 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   constexpr std::size_t num_blocks = 10;
   if (logs.size() < 3 * num_blocks) return std::nullopt;
   const std::size_t num_given = logs.size();
-  const double middle = median(logs);
+  const double median = median_of(logs);
   std::vector<double> sizes;
-  for (const double log : logs) sizes.push_back(std::abs(log - middle));
-  const double limit = rejected_beyond * sigma_of_median_deviation * median(std::move(sizes));
-  std::erase_if(logs, [&](double log) { return std::abs(log - middle) > limit; });
+  for (const double log : logs) sizes.push_back(std::abs(log - median));
+  const double limit = rejected_beyond * normal_from_mad * median_of(std::move(sizes));
+  std::erase_if(logs, [&](double log) { return std::abs(log - median) > limit; });
   double sum = 0.0, squares = 0.0;
   for (std::size_t i = 0; i < num_blocks; ++i) {
     const std::size_t begin = i * logs.size() / num_blocks, end = (i + 1) * logs.size() / num_blocks;

@@ -5,6 +5,8 @@
 
 // Odometry's scale, and what all sensors say together.
 
+#include "alidade/estimation/median.h"
+
 namespace alidade {
 namespace {
 
@@ -13,12 +15,6 @@ struct Place {
   Eigen::Vector3d of_path, of_vehicle;
   double way_m = 0.0;  ///< By odometry, since the first.
 };
-
-double upper_median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// At the times of the readings.
 std::vector<Place> places_of(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
@@ -52,11 +48,11 @@ std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> read
   }
   if (logs.size() < enough) return std::nullopt;
   const std::size_t num_given = logs.size();
-  constexpr double sigma_of_median_deviation = 1.4826, rejected_beyond = 4.0;
-  const double centre = upper_median(logs);
+  constexpr double rejected_beyond = 4.0;  // of their robust σ
+  const double centre = median_of(logs);
   std::vector<double> sizes;
   for (const double log : logs) sizes.push_back(std::abs(log - centre));
-  const double limit = rejected_beyond * sigma_of_median_deviation * upper_median(std::move(sizes)) + 1e-9;
+  const double limit = rejected_beyond * normal_from_mad * median_of(std::move(sizes)) + 1e-9;
   std::erase_if(logs, [&](double log) { return std::abs(log - centre) > limit; });
   double sum = 0.0, squares = 0.0;
   for (const double log : logs) sum += log;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -17,10 +18,9 @@ std::vector<KnownPoint> known_points(const SavedMap& map) {
     sigmas_m.push_back(sigma_m);
   }
   if (points.empty()) return points;
-  const auto centre = sigmas_m.begin() + static_cast<std::ptrdiff_t>(sigmas_m.size() / 2);
-  std::ranges::nth_element(sigmas_m, centre);
-  constexpr double far_less_sure = 5.0;
-  std::erase_if(points, [&](const KnownPoint& point) { return point.sigma_m > far_less_sure * *centre; });
+  constexpr double max_over_median = 5.0;
+  const double max_sigma_m = max_over_median * median_of(std::move(sigmas_m));
+  std::erase_if(points, [&](const KnownPoint& point) { return point.sigma_m > max_sigma_m; });
   return points;
 }
 

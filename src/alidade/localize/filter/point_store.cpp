@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "alidade/estimation/median.h"
+
 namespace alidade {
 
 bool PointStore::is_stranger(long id, ObservationOutcome outcome, std::size_t frame) {
@@ -48,8 +50,7 @@ double PointStore::usual_depth_m(const LocalizationFilter& filter) const {
     if (depth > 0.0 && (feature.is_known || config_->target.points.empty())) depths.push_back(depth);
   }
   if (depths.empty()) return 1.0;  // a world without scale: its first points are one unit away
-  std::ranges::nth_element(depths, depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2));
-  return depths[depths.size() / 2];
+  return median_of(std::move(depths));
 }
 
 /// Null where none is given.

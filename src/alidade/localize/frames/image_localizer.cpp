@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "alidade/estimation/median.h"
 #include "alidade/patches/corner_features.h"
 
 namespace alidade {
@@ -20,8 +21,8 @@ LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigm
   if (!(config.sigma_new_px > 0.0)) config.sigma_new_px = sigma_floor_px;
   // Many matches settle the first frames' poses: errors may rotate with the world there too, and must not follow one
   // side.
-  config.max_turn_rad = std::max(config.max_turn_rad, 0.05);
-  config.bend_tolerance = std::min(config.bend_tolerance, 0.001);
+  config.max_rotation_rad = std::max(config.max_rotation_rad, 0.05);
+  config.curvature_tolerance = std::min(config.curvature_tolerance, 0.001);
   config.consensus_above = std::max(config.consensus_above, few_doubtful);
   return config;
 }
@@ -199,8 +200,7 @@ double ImageLocalizer::usual_depth_m() const {
     if (depth > 0.0 && feature.kind == FeatureKind::xyz) depths.push_back(depth);
   }
   if (depths.empty()) return 1.0;  // a world without scale: its first points are one unit away
-  std::ranges::nth_element(depths, depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2));
-  return depths[depths.size() / 2];
+  return median_of(std::move(depths));
 }
 
 /// Where the map is full, what has not been seen for longest leaves.

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "alidade/estimation/median.h"
 #include "alidade/localize/filter/known_map.h"
 #include "alidade/localize/frames/image_localizer.h"
 
@@ -60,8 +61,7 @@ bool ImageLocalizer::start_in_map(const cv::Mat& smoothed) {
   std::vector<double> depths;
   for (const auto& [id, saved] : saved_) depths.push_back(saved.landmark.first_distance_m);
   if (depths.empty()) return false;
-  std::ranges::nth_element(depths, depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2));
-  for (const StartHypothesis& from : likely_places(smoothed, depths[depths.size() / 2])) {
+  for (const StartHypothesis& from : likely_places(smoothed, median_of(std::move(depths)))) {
     record_ = {};
     begin_at({{from}});
     PathStep found;

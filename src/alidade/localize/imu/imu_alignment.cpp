@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/imu/preintegration.h"
 #include "alidade/localize/imu/imu_rates.h"
@@ -161,10 +162,7 @@ std::optional<AlignmentFit> fit(std::span<const AlignmentRow> rows, const Imu& i
 void weigh(std::vector<AlignmentRow>& rows, const AlignmentFit& at) {
   std::vector<double> sizes;
   for (const AlignmentRow& row : rows) sizes.push_back((row.D - row.J * at.x).norm());
-  std::vector<double> sorted = sizes;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::ranges::nth_element(sorted, middle);
-  const double usual = 3.0 * *middle + 1e-12;  // of three components the median is 1.5σ
+  const double usual = 3.0 * median_of(sizes) + 1e-12;  // of three components the median is 1.5σ
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].weight = 1.0 / (1.0 + std::pow(sizes[i] / usual, 2));
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 #include <set>
 
+#include "alidade/estimation/median.h"
 #include "alidade/localize/path/similarity_graph.h"
 
 namespace alidade {
@@ -91,10 +92,7 @@ class LoopCloser {
       std::vector<double> distances;
       for (const long id : keyframe.ids)
         distances.push_back((place(id) - problem_.world_from_cam[k].translation).norm());
-      if (!distances.empty()) {
-        std::ranges::nth_element(distances, distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2));
-        keyframe.depth_m = distances[distances.size() / 2];
-      }
+      if (!distances.empty()) keyframe.depth_m = median_of(std::move(distances));
       keyframes_.push_back(std::move(keyframe));
     }
   }

@@ -32,15 +32,15 @@ CommonMatrix CommonPrior::information(const CommonLayout& layout) const {
   CommonMatrix information = CommonMatrix::Zero(layout.size, layout.size);
   information.diagonal() = sigma.array().square().inverse();
   for (int i = 0; i < 4; ++i) {
-    if (says_k[static_cast<std::size_t>(i)]) information(i, i) = 0.0;
+    if (is_given_k[static_cast<std::size_t>(i)]) information(i, i) = 0.0;
   }
-  return information + said_information(layout);
+  return information + given_information(layout);
 }
 
-CommonMatrix CommonPrior::said_information(const CommonLayout& layout) const {
+CommonMatrix CommonPrior::given_information(const CommonLayout& layout) const {
   CommonMatrix information = CommonMatrix::Zero(layout.size, layout.size);
   for (int i = 0; i < 4; ++i) {
-    if (says_k[static_cast<std::size_t>(i)]) information(i, i) = 1.0 / (sigma_k[i] * sigma_k[i]);
+    if (is_given_k[static_cast<std::size_t>(i)]) information(i, i) = 1.0 / (sigma_k[i] * sigma_k[i]);
   }
   if (layout.errors >= 0) {
     information.diagonal().segment(layout.errors, layout.num_errors).setConstant(1.0 / (sigma_error * sigma_error));
@@ -54,10 +54,10 @@ CommonPrior CommonPrior::about(const RotatingCamera& camera) const {
   CommonPrior moved = *this;
   moved.mean = camera;
   for (int i = 0; i < 4; ++i) {
-    if (says_k[static_cast<std::size_t>(i)]) moved.mean.k[i] = mean.k[i];
+    if (is_given_k[static_cast<std::size_t>(i)]) moved.mean.k[i] = mean.k[i];
   }
   // A said aspect is one of the difference: its mean must keep it.
-  if (std::isfinite(sigma_aspect) && !says_k[0] && !says_k[1]) {
+  if (std::isfinite(sigma_aspect) && !is_given_k[0] && !is_given_k[1]) {
     moved.mean.k.head<2>().setConstant(0.5 * (camera.k[0] + camera.k[1]));
   }
   return moved;
@@ -94,14 +94,14 @@ CommonMatrix BundleSolution::covariance() const {
 }
 
 CommonMatrix BundleSolution::bound() const {
-  const CommonMatrix all = information + said_information;
+  const CommonMatrix all = information + given_information;
   return inverse_symmetric(all);
 }
 
 double robust_sigma(std::vector<double> residual_norms, int dof) {
   if (residual_norms.empty() || dof < 1) return 0.0;
   const double share = static_cast<double>(dof) / (2.0 * static_cast<double>(residual_norms.size()));
-  return median_of(std::move(residual_norms)) / std::sqrt(2.0 * std::log(2.0)) / std::sqrt(share);
+  return median_of(std::move(residual_norms)) / rayleigh_median / std::sqrt(share);
 }
 
 }  // namespace alidade

@@ -11,10 +11,10 @@
 #include <span>
 #include <utility>
 
+#include "alidade/geometry/degree.h"
+
 namespace alidade {
 namespace {
-
-constexpr double radians_per_degree = std::numbers::pi / 180.0;
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -154,7 +154,7 @@ std::vector<RotationLogColumns::Angle> find_head(Header& header, const std::vect
        {"roll", "roll_rad", "roll_deg"}}};
   std::vector<RotationLogColumns::Angle> angles;
   for (const std::size_t column : header.find_all(wanted, true)) {
-    const double unit_rad = names[column].ends_with("_deg") ? radians_per_degree : 1.0;
+    const double unit_rad = names[column].ends_with("_deg") ? degree : 1.0;
     // An azimuth grows to the right, as a compass does; pan and yaw to the left.
     angles.push_back({column, names[column].starts_with("azimuth") ? -unit_rad : unit_rad});
   }

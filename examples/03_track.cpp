@@ -1,4 +1,4 @@
-// The path of a target from what two pan-tilt heads saw of it, as it would come from them: 03_track events.csv rig.yaml
+// The path of a target from the observations of two pan-tilt heads, one by one: 03_track events.csv rig.yaml
 #include <alidade/files.h>
 #include <alidade/track.h>
 

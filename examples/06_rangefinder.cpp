@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
     const auto k = static_cast<Eigen::Index>(i);
     std::printf("%-12s σ %.2g\n", result.parameter_names[i].c_str(), std::sqrt(result.covariance(k, k)));
   }
-  // Where a reading of 2 m lies, and how surely.
+  // The point of a reading of 2 m, with its covariance.
   const alidade::BeamPoint point = alidade::measured_point(result.beam, 2.0);
   std::printf("2 m is at (%.4f, %.4f, %.4f) m, σ %.2g m\n", point.point_in_cam.x(), point.point_in_cam.y(),
               point.point_in_cam.z(), std::sqrt(point.cov.trace()));

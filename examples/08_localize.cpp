@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
   alidade::LocalizeConfig config;
   config.target = alidade::read_target(argv[3]);
 
-  // As they come, frame by frame …
+  // Incrementally, frame by frame …
   alidade::Localizer localizer(camera, config);
   for (const alidade::ObservationFrame& frame : seen.frames) {
     const alidade::PathStep& step = localizer.push(frame);

@@ -1,4 +1,4 @@
-// Where readings of a rangefinder are in the image and in space, and how surely: 09_project rangefinder.yaml
+// Pixels and points of a rangefinder's readings, with their covariance: 09_project rangefinder.yaml
 // camera.yaml 2.31
 #include <alidade/files.h>
 #include <alidade/project.h>

@@ -52,9 +52,11 @@ TEST(BoardOptions, NameWhatIsWrong) {
 }
 
 TEST(BoardOptions, AskWhereMillimetresWereMeant) {
-  EXPECT_EQ(fault_of("--board 9x6 --square 25"), "--square: '25' is in metres: 0.025? Or with its unit, 25mm or 25m");
+  EXPECT_EQ(fault_of("--board 9x6 --square 25"),
+            "--square: '25' would be 25 m: give metres, 0.025, or a unit, 25mm or 25m");
   EXPECT_THAT(fault_of("--board 9x6 --square 2.5"), ::testing::HasSubstr("2.5mm or 2.5m"));
-  EXPECT_THAT(fault_of("--board 9x6 --square 0.03 --target charuco --marker 22"), ::testing::HasSubstr("0.022?"));
+  EXPECT_THAT(fault_of("--board 9x6 --square 0.03 --target charuco --marker 22"),
+              ::testing::HasSubstr("0.022, or a unit"));
   EXPECT_EQ(fault_of("--board 9x6 --square 0.00025"),
             "--square: '0.00025' is in metres, 0.25 mm: if that is meant, with its unit, 0.25mm");
   for (const double usual_m : {0.0005, 0.004, 0.025, 1.0, 2.0}) {  // 1: many do not care for the unit

@@ -191,7 +191,7 @@ void add_batch(App& app) {
        .examples = "  alidade batch jobs.csv --out lot\n"
                    "  alidade batch jobs.csv --out lot --resume\n"
                    "  mpirun -n 8 alidade batch jobs.csv --out lot && alidade batch jobs.csv --out lot --resume\n\n"
-                   "jobs.csv, a row a command; other columns are options by their names:\n"
+                   "jobs.csv, one row per command; other columns are options by their names:\n"
                    "  camera,arguments,square\n"
                    "  c0001,calibrate photos/c0001 --board 9x6,0.025"},
       [args](Run& run) { return run_batch(*args, run); });

@@ -152,7 +152,7 @@ TEST_F(Corners, SquaresInMillimetresAreAskedAbout) {
   add_photos(1);
   const Outcome outcome = run("calibrate", {photos().string(), "--board", "9x6", "--square", "25"});
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("is in metres: 0.025?"));
+  EXPECT_THAT(outcome.err, HasSubstr("give metres, 0.025, or a unit"));
 }
 
 TEST_F(Corners, PhotosTurnedByExifAreNamedAndUsedAsStored) {

@@ -80,7 +80,7 @@ Field follow_field(NamedLook& look) {
   Field field = look_field(look);
   field.name = "follow";
   field.option = "--follow";
-  field.help = "Follows what looks so: " + field.help;
+  field.help = "Follow a target, by its appearance: " + field.help.substr(field.help.find("colour:"));
   field.group.clear();
   field.old_options.clear();
   return field;
@@ -88,30 +88,31 @@ Field follow_field(NamedLook& look) {
 
 FieldList fields_of(HeadArgs& args) {
   return {
-      {.name = "move", .value = &args.move, .help = "The head may move; without it nothing does"},
+      {.name = "move", .value = &args.move, .help = "Allow the head to move; without it nothing moves"},
       {.name = "identify",
        .value = &args.identify,
-       .help = "Its model: rate, acceleration, time constant, latency, backlash, dead band, repeatability"},
+       .help = "Identify its model: rate, acceleration, time constant, latency, backlash, dead band, repeatability"},
       {.name = "calibrate",
        .value = &args.calibrate,
-       .help = "Its camera, by moves that are planned from what is known: lens, mounting, delay"},
+       .help = "Calibrate its camera by planned moves: lens, mounting, delay"},
       {.name = "stream",
        .value = &args.stream,
        .help =
-           "What its camera sees: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (it says "
+           "Video of its camera: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (it says "
            "where), indi://HOST:PORT/CAMERA, or sim:// of a simulated head",
        .form = "URL"},
       {.name = "until",
        .value = share_code(args.until),
-       .help = "Until 3 sigma of fx and fy are this share of them; 4 where that cannot be (default: its usual time)",
+       .help = "Stop when 3 sigma of fx and fy are this share of them; exit code 4 if that is not reached (default: "
+               "its usual time)",
        .form = "SHARE%"},
       {.name = "most_s",
        .value = &args.max_s,
-       .help = "For how long --calibrate or --follow may hold the head [s]",
+       .help = "Longest time that --calibrate or --follow may take [s]",
        .limits = {5.0, 86400.0}},
       {.name = "resume",
        .value = &args.resume,
-       .help = "For --calibrate: what an earlier run, perhaps a broken one, left in DIR counts as well",
+       .help = "For --calibrate: use the measurements of an earlier, perhaps interrupted, run in DIR as well",
        .form = "DIR"},
       {.name = "password_file",
        .value = &args.password_file,
@@ -121,7 +122,7 @@ FieldList fields_of(HeadArgs& args) {
       {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml of --calibrate", .form = "FILE"},
       {.name = "identified",
        .value = &args.identified,
-       .help = "For --follow: the folder of --identify, whose rate, time constant, latency and resolution count",
+       .help = "For --follow: the folder of --identify, whose rate, time constant, latency and resolution are used",
        .form = "DIR"},
       {.name = "latency_s",
        .value = &args.latency_s,
@@ -129,15 +130,15 @@ FieldList fields_of(HeadArgs& args) {
        .limits = {0.0, 2.0}},
       {.name = "delay_s",
        .value = &args.follow.delay_s,
-       .help = "For --follow: a frame shows the angles of so much later than its time, as --calibrate estimates it [s]",
+       .help = "For --follow: delay of the angles after a frame's time, as --calibrate estimates it [s]",
        .limits = {-2.0, 2.0}},
       {.name = "pan_range",
        .value = range_code(args.range, 0),
-       .help = "Where it may go, in degrees, left above zero (default: the head's own limits)",
+       .help = "Allowed pan angles, in degrees, positive to the left (default: the head's own limits)",
        .form = "LOW,HIGH"},
       {.name = "tilt_range",
        .value = range_code(args.range, 1),
-       .help = "Where it may go, in degrees, up above zero (default: the head's own limits)",
+       .help = "Allowed tilt angles, in degrees, positive upwards (default: the head's own limits)",
        .form = "LOW,HIGH"}};
 }
 
@@ -338,7 +339,8 @@ void add_head(App& app) {
   auto args = std::make_shared<HeadArgs>();
   CLI::App& command = app.add_command(
       {.name = "head",
-       .summary = "A pan-tilt head that is connected: what it is, and how it follows its commands",
+       .summary =
+           "A connected pan-tilt head: what it is, how it follows its commands, its camera, and following a target",
        .examples =
            "alidade head rotctl://127.0.0.1:4533\n"
            "alidade head rotctl://127.0.0.1:4533 --identify --move --pan-range -60,60 --tilt-range 0,60\n"

@@ -48,19 +48,19 @@ FieldList fields_of(Imu& imu) {
   return {
       {.name = "gyro_noise",
        .value = &noise.rate_density,
-       .help = "Of --imu: density of the noise of its rates [rad/s/√Hz]",
+       .help = "Noise density of the gyroscope of --imu [rad/s/√Hz]",
        .limits = positive},
       {.name = "accelerometer_noise",
        .value = &noise.force_density,
-       .help = "Of its forces [m/s²/√Hz]",
+       .help = "Noise density of its accelerometer [m/s²/√Hz]",
        .limits = positive},
       {.name = "gyro_walk",
        .value = &noise.rate_walk,
-       .help = "Of the random walk of the bias of its rates [rad/s²/√Hz]",
+       .help = "Random walk of the gyroscope's bias [rad/s²/√Hz]",
        .limits = positive},
       {.name = "accelerometer_walk",
        .value = &noise.force_walk,
-       .help = "Of the bias of its forces [m/s³/√Hz]",
+       .help = "Random walk of the accelerometer's bias [m/s³/√Hz]",
        .limits = positive},
       {.name = "sigma_accelerometer_scale",
        .value = &noise.sigma_force_scale,
@@ -133,7 +133,7 @@ FieldList fields_of(LocalizeArgs& args) {
        .form = "FILE"},
       {.name = "imu_mounting",
        .value = &args.imu_mounting,
-       .help = "How it is fixed to the camera, cam_from_imu: translation_m and quaternion_wxyz, or Kalibr's T_cam_imu "
+       .help = "Its mounting, cam_from_imu: translation_m and quaternion_wxyz, or Kalibr's T_cam_imu "
                "(default: its rotation is found by the motion, its position within 0.1 m)",
        .form = "FILE"},
       {.name = "truth",
@@ -314,7 +314,7 @@ void add_localize(App& app) {
                    "--sigma-alpha 6\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml --calibrate-online\n"
-                   "tracker | alidade localize - --camera camera.yaml --target target.yaml\n"
+                   "  tracker | alidade localize - --camera camera.yaml --target target.yaml\n"
                    "alidade localize later/ --camera camera.yaml --map alidade-out/localize/map.yaml --rate 30\n"
                    "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"
                    "alidade localize sights.csv --camera camera.yaml --depth-sensor depth.csv\n"

@@ -160,7 +160,7 @@ void add_underwater_scenario(App& app) {
   CLI::Option* points = command.add_option("--points", scene.num_points, "The board's 8, then others")
                             ->check(CLI::Range(1, 1000))
                             ->capture_default_str();
-  command.add_option("--rate", args->rate_hz, "Frames a second")->check(positive_number())->capture_default_str();
+  command.add_option("--rate", args->rate_hz, "Frames per second")->check(positive_number())->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };

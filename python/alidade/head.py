@@ -84,7 +84,7 @@ class Head:
     @former(most_s="max_s")
     def follow(self, stream: str, look: str, rig: Any, *, latency_s: float | None = None, delay_s: float | None = None,
                max_s: float | None = None, progress: Progress | None = None) -> Result:
-        """Follows what looks so ("bright", "colour:230,70,20", "marker:DICT_4X4_50:7"), as `alidade head URL --stream STREAM
+        """Follows a target by its appearance ("bright", "colour:230,70,20", "marker:DICT_4X4_50:7"), as `alidade head URL --stream STREAM
         --rig RIG --follow LOOK --move`. rig: rig.yaml of calibrate(), or its result."""
         words = [f"--stream={stream}", f"--follow={look}"]
         words += [f"--latency={latency_s}"] if latency_s is not None else []

@@ -81,8 +81,8 @@ const WordList<ServoKindRule>& servo_kind_words() {
 FieldList fields_of(IdentifyConfig& config) {
   return {{.name = "kind",
            .value = words_code(config.kind, servo_kind_words()),
-           .help = "What follows the command with a lag: the angle, or its rate; auto: the one whose residuals are "
-                   "clearly the smaller"},
+           .help = "What follows the command with a lag: the angle, or its rate; auto: the one with clearly "
+                   "smaller residuals"},
           {.name = "sigma_clock",
            .value = &config.sigma_clock,
            .help = "σ of the rate of the log's clock (0.001: 0.1 %), counted in σ; 0: exact",

@@ -72,7 +72,7 @@ FieldList port_fields(PortKnowledge& port) {
            .limits = index},
           {.name = "n_water",
            .value = &port.n_water,
-           .help = "flat_port: of the water, fixed (fresh 1.333, sea 1.34)",
+           .help = "flat_port: refractive index of the water, fixed (fresh 1.333, sea 1.34)",
            .limits = index}};
 }
 
@@ -93,7 +93,7 @@ FieldList fields_of(CalibrateConfig& config) {
       {.name = "model", .value = words_code(config.model, models()), .help = "Lens model"},
       {.name = "fixed",
        .value = &config.fixed,
-       .help = "Parameters fixed at zero (cx, cy: the image's centre; with --prior: its value), as k3,p1,p2",
+       .help = "Parameters fixed at zero (cx, cy: the image's centre; with --prior: its value), for example k3,p1,p2",
        .option = "--fix"},
       {.name = "free", .value = &config.free, .help = "Parameters estimated that are fixed otherwise: skew"},
       {.name = "prior",

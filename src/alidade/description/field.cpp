@@ -161,7 +161,7 @@ TextCode length_code(double& value_m, double min_m, double max_m) {
     if (metres == 0.0) return quoted(text) + " is not a finite number";
     if (!(value > 0.0)) return quoted(text) + " is not above zero";
     if (unit.empty() && value > max_m) {
-      return fmt::format("'{0}' is in metres: {1:g}? Or with its unit, {0}mm or {0}m", text, 1e-3 * value);
+      return fmt::format("'{0}' would be {0} m: give metres, {1:g}, or a unit, {0}mm or {0}m", text, 1e-3 * value);
     }
     if (unit.empty() && value < min_m) {
       return fmt::format("'{}' is in metres, {:g} mm: if that is meant, with its unit, {:g}mm", text, 1e3 * value,

@@ -71,8 +71,9 @@ std::unique_ptr<HeadDevice> open_head(const std::string& url, const HeadOptions&
   if (url.starts_with("onvif://")) return open_onvif(url, options);
   if (url.starts_with("indi://")) return open_indi(url, options);
   if (url.starts_with("sim://")) return open_simulated_head(url);
-  throw InputError("'" + without_password(url) +
-                   "' is no head: give rotctl://HOST:PORT, onvif://USER@HOST, indi://HOST:PORT/DEVICE or sim://");
+  throw InputError(
+      "'" + without_password(url) +
+      "' is not a head's address: give rotctl://HOST:PORT, onvif://USER@HOST, indi://HOST:PORT/DEVICE or sim://");
 }
 
 void HeadDevice::zoom_to(double) { throw InputError(name() + ": has no zoom that can be commanded"); }

@@ -18,9 +18,9 @@ FieldList fields_of(LocalizeConfig& config) {
        .help = "How a new point enters: inverse-depth, xyz, or delayed until its depth is known to 5 %"},
       {.name = "depth_m",
        .value = &config.depth_m,
-       .help = "Depth at which a new point is first believed [m] (default: the target's)",
+       .help = "Depth first assumed for a new point [m] (default: the target's)",
        .limits = positive},
-      {.name = "sigma_depth", .value = &config.sigma_depth, .help = "σ of that over the depth", .limits = positive},
+      {.name = "sigma_depth", .value = &config.sigma_depth, .help = "σ of that depth, relative", .limits = positive},
       {.name = "sigma_px",
        .value = &config.sigma_px,
        .help = "σ of a pixel coordinate (default 0.5); in images, where each match brings its own, the least (default "
@@ -42,13 +42,12 @@ FieldList fields_of(LocalizeConfig& config) {
        .option = "--sigma-alpha"},
       {.name = "sigma_odometry",
        .value = &config.sigma_odometry,
-       .help = "σ of the lengths of --odometry over them, as all share it: a wheel's radius (0.01: 1 %)",
+       .help = "σ of the scale of --odometry, relative, as of a wheel's radius (0.01: 1 %)",
        .limits = positive},
       {.name = "max_points",
        .value = &config.max_points,
-       .help = "Points in the filter at once, beside the target's: where it is full, the least informative leaves, and "
-               "comes "
-               "back when it is seen again (0: as many as its state of 800 holds; in images 120)",
+       .help = "Points in the filter at once, beside the target's: when full, the least informative is removed, and "
+               "added again when it is seen again (0: as many as its state of 800 holds; in images 120)",
        .limits = {0.0, 3000.0}},
   };
 }

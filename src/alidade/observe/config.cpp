@@ -32,7 +32,8 @@ FieldList word_fields(ObserveConfig& config) {
   return {
       {.name = "method",
        .value = words_code(config.method, methods),
-       .help = "hybrid, window, flow, fang2011 or batch"},
+       .help = "hybrid: adjustment, then a filter that follows zooms; window: adjustment of the last seconds; flow: "
+               "regression on image motion; fang2011: the paper's observer; batch: one adjustment of all rows"},
       {.name = "rotation",
        .value = words_code(config.rotation, rotations),
        .help = "known: exact; noisy: measured with --sigma-angle or --sigma-rate; free"},
@@ -47,7 +48,7 @@ FieldList word_fields(ObserveConfig& config) {
       {.name = "size",
        .value = pair_code(config.width_px, config.height_px, 20000,
                           "WIDTHxHEIGHT of 32 to 20000 px, for example 800x600", 32),
-       .help = "Size of the images (default: the camera's, else what holds the points)",
+       .help = "Size of the images (default: the camera's, else the smallest that contains the points)",
        .form = "WxH"},
       {.name = "profile", .value = words_code(config.profile, profiles), .help = "Gains of --method fang2011"}};
 }
@@ -100,7 +101,8 @@ FieldList number_fields(ObserveConfig& config) {
            .option = "--window-s"},
           {.name = "keep_rows",
            .value = &config.keep_rows,
-           .help = "Of rows from standard input: the newest that the result at the end is of, at most twice as many",
+           .help = "Of rows from standard input: how many of the newest the final result covers at least; at most "
+                   "twice as many",
            .limits = {.min = 100, .max = 1e9}}};
 }
 

@@ -36,12 +36,12 @@ FieldList sigma_fields(RangefinderConfig& config) {
            .limits = share},
           {.name = "sigma_range_per_m",
            .value = &config.sigma_range_per_m,
-           .help = "What it grows by for each metre of range",
+           .help = "Growth of σ of a reading per metre of range [m/m]",
            .limits = positive,
            .option = "--sigma-range-per-m"},
           {.name = "sigma_incidence_m",
            .value = &config.sigma_incidence_m,
-           .help = "What it grows by with tan of the angle of incidence [m]",
+           .help = "σ of a reading per tan of the angle of incidence, added in quadrature [m]",
            .limits = positive,
            .option = "--sigma-incidence-m"}};
 }

@@ -72,7 +72,8 @@ FieldList fields_of(TrackConfig& config) {
       {.name = "max_depth_m", .value = &config.max_depth_m, .help = "Working range, furthest [m]", .limits = positive},
       {.name = "keep_rows",
        .value = &config.keep_rows,
-       .help = "Of rows from standard input: the newest that the result at the end is of, at most twice as many",
+       .help = "Of rows from standard input: how many of the newest the final result covers at least; at most twice as "
+               "many",
        .limits = {.min = 100, .max = 1e9}}};
 }
 

@@ -93,7 +93,7 @@ export const rangefinderBeam: Figure = {
     const row = el('div', {class: 'row', style: 'flex:1'}), left = el('div', {style: 'flex:2.2'}), right = el('div');
     host.append(row);
     row.append(left);
-    const words = beam ? `The beam starts ${num(1e3 * norm(beam.origin), 3)} mm from the camera's centre` : 'No beam: these shots cannot tell it';
+    const words = beam ? `The beam starts ${num(1e3 * norm(beam.origin), 3)} mm from the camera's centre` : 'No beam: these shots do not determine it';
     const view = new View3(left, {height: 400, isFilling: true, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.7, pitch: 0.3, label: words, note: `3σ ×${factor}`}, () => wholeWorld(scene, selection, longest, factor));
     selection.on(() => view.refresh());
     if (beam) {
@@ -101,6 +101,6 @@ export const rangefinderBeam: Figure = {
       right.append(el('p', {class: 'caption'}, `at the camera: ${num(1e3 * norm(beam.origin), 3)} mm from its centre`));
       new View3(right, {height: 300, isFilling: true, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.6, pitch: 0.35, label: words, note: `3σ ×${nearFactor}`}, () => nearWorld(scene, nearFactor));
     }
-    return {marks: Math.min(mostShots, shots.length), rows: Math.min(mostShots, shots.length), tables: [scene.table], words, good: beam ? 'Good: hits from near to far, boards tilted to all sides; a thin cone and a small ellipsoid.' : 'No beam is drawn: these boards cannot tell it. Good would be boards tilted to all sides, from near to far.'};
+    return {marks: Math.min(mostShots, shots.length), rows: Math.min(mostShots, shots.length), tables: [scene.table], words, good: beam ? 'Good: hits from near to far, boards tilted to all sides; a thin cone and a small ellipsoid.' : 'No beam is drawn: these boards do not determine it. Good would be boards tilted to all sides, from near to far.'};
   },
 };

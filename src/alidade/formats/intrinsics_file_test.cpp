@@ -40,7 +40,7 @@ TEST(IntrinsicsFile, EveryEventHasAWord) {
   for (const auto& [event, word] : words) EXPECT_EQ(event_name(event), word);
 }
 
-class LensCourseFile : public ::testing::Test {
+class IntrinsicsHistoryFile : public ::testing::Test {
  protected:
   IntrinsicsHistory read(const std::string& text) {
     file_ = std::filesystem::path(::testing::TempDir()) / "intrinsics_history.csv";
@@ -59,7 +59,7 @@ class LensCourseFile : public ::testing::Test {
   const std::string header_ = "t_s,fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,nis,event\n";
 };
 
-TEST_F(LensCourseFile, IsReadAsItIsWritten) {
+TEST_F(IntrinsicsHistoryFile, IsReadAsItIsWritten) {
   std::vector<IntrinsicsEstimate> estimates(4);
   estimates[1] = {.has_value = true, .fx = 700, .fy = 690, .cx = 390, .cy = 290};
   estimates[1].sigma = {1, 2, 3, 4};
@@ -76,7 +76,7 @@ TEST_F(LensCourseFile, IsReadAsItIsWritten) {
   EXPECT_EQ(history.at(0.6).sigma[3], 4.0);
 }
 
-TEST_F(LensCourseFile, RefusesWhatIsNone) {
+TEST_F(IntrinsicsHistoryFile, RefusesWhatIsNone) {
   expect_refusal("t_s,fx\n0,700\n", "fy");
   expect_refusal(header_, "");
   expect_refusal(header_ + "0,,,,,,,,,,\n", "has no row with an estimate");

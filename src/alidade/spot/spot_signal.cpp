@@ -282,6 +282,40 @@ std::string reason_against(const cv::Mat& photo, const LaserSpotAids& aids) {
   return {};
 }
 
+/// Background of a colour photo: the combination of its other two channels that fits the main one.
+void estimate_from_channels(const std::vector<Image>& channels, std::size_t at, SpotSignal& signal) {
+  const Image& main = channels[at];
+  const Image one = Image::Ones(main.rows(), main.cols());
+  const Image &first = channels[(at + 1) % 3], &second = channels[(at + 2) % 3];
+  // Without contrast noise alone would determine the shares, meaninglessly; neutral colours have halves.
+  constexpr double prior_noises = 60.0;
+  const double noise = noise_of(first), prior = prior_noises * noise * noise;
+  const RobustSum sum(main, {&first, &second, &one}, unsaturated(main.max(first).max(second)), prior);
+  if (sum.is_solved()) signal.background = sum.sum();
+  signal.background_is_lit = true;
+}
+
+/// Background of a chessboard of known pose: its ink and paper.
+void estimate_from_board(const Image& main, const SeenBoard& board, SpotSignal& signal) {
+  Image model = board_background(main, signal, board);
+  if (model.size() == 0) return;
+  signal.background = std::move(model);
+  signal.background_is_lit = false;
+  const Image over_model = main - signal.background;
+  // The excess over other channels fits the print better, but it vanishes where its own channel saturates.
+  signal.is_modelled = signal.detected.size() == 0;
+  if (signal.is_modelled) signal.detected = signal.light = over_model;
+  signal.light = (signal.is_saturated > 0).select(over_model, signal.light);
+}
+
+/// Gradient of the background. At the centre of a saddle there is none, but an error as large as beside it.
+void find_edges(SpotSignal& signal) {
+  Image gradient = gradient_length(signal.background);
+  signal.edge.resizeLike(gradient);
+  cv::Mat widened = as_mat(signal.edge);
+  cv::dilate(as_mat(gradient), widened, cv::Mat());
+}
+
 }  // namespace
 
 SpotSignal spot_signal(const cv::Mat& photo, int channel, const LaserSpotAids& aids) {
@@ -303,42 +337,17 @@ SpotSignal spot_signal(const cv::Mat& photo, int channel, const LaserSpotAids& a
   const std::size_t at = channels.size() == 1 ? 0 : static_cast<std::size_t>(channel);
   const Image& main = channels[at];
   signal.is_saturated = 255 - unsaturated(main);
-  if (aids.photo_off) {
+  if (aids.photo_off)
     signal.background = matched_to(main, channels_of(*aids.photo_off, part, scale)[at]);
-    signal.detected = signal.light = main - signal.background;
-  } else if (channels.size() > 1 && channel < 3) {
-    const Image one = Image::Ones(part.height, part.width);
-    const Image &first = channels[(at + 1) % 3], &second = channels[(at + 2) % 3];
-    // Without contrast noise alone would determine the shares, meaninglessly; neutral colours have halves.
-    constexpr double prior_noises = 60.0;
-    const double noise = noise_of(first), prior = prior_noises * noise * noise;
-    const RobustSum sum(main, {&first, &second, &one}, unsaturated(main.max(first).max(second)), prior);
-    if (sum.is_solved()) signal.background = sum.sum();
-    signal.background_is_lit = true;
-  }
-  const bool has_model = !aids.photo_off && is_chessboard(aids);
+  else if (channels.size() > 1 && channel < 3)
+    estimate_from_channels(channels, at, signal);
   if (signal.background.size() > 0) signal.detected = signal.light = main - signal.background;
-  if (has_model) {
-    Image model = board_background(main, signal, *aids.seen_board);
-    if (model.size() > 0) {
-      signal.background = std::move(model);
-      signal.background_is_lit = false;
-      const Image over_model = main - signal.background;
-      // The excess over other channels fits the print better, but it vanishes where its own channel saturates.
-      signal.is_modelled = signal.detected.size() == 0;
-      if (signal.is_modelled) signal.detected = signal.light = over_model;
-      signal.light = (signal.is_saturated > 0).select(over_model, signal.light);
-    }
-  }
+  if (!aids.photo_off && is_chessboard(aids)) estimate_from_board(main, *aids.seen_board, signal);
   if (signal.background.size() == 0) {
     signal.reason = "the photo is blown out";
     return signal;
   }
-  // At the centre of a saddle there is no gradient, but an error as large as beside it.
-  Image gradient = gradient_length(signal.background);
-  signal.edge.resizeLike(gradient);
-  cv::Mat widened = as_mat(signal.edge);
-  cv::dilate(as_mat(gradient), widened, cv::Mat());
+  find_edges(signal);
   measure_noise(signal);
   return signal;
 }

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/turned/turned.h"
@@ -212,9 +214,8 @@ Check centre_check(const TurnedReport& report) {
   return check;
 }
 
-}  // namespace
-
-Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
+/// Why there is no estimate, in a verdict; none where there is one.
+std::optional<Verdict> refusal_of(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
   switch (report.status) {
     case Status::too_few_photos:
       return refused(too_few(report, photos), ExitCode::undetermined);
@@ -236,8 +237,15 @@ Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, 
           {"no camera that rotates explains these matches", "check that the photos are of one camera and spot"},
           ExitCode::no_convergence);
     case Status::ok:
-      break;
+      return std::nullopt;
   }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
+  if (std::optional<Verdict> refusal = refusal_of(report, photos, config)) return *std::move(refusal);
   Verdict verdict;
   verdict.checks = {focal_check(report),
                     photos_check(report, photos),

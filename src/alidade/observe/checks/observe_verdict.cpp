@@ -2,6 +2,7 @@
 #include <cmath>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
@@ -198,9 +199,8 @@ void add_scale_check(const ObserveSolution& report, Verdict& verdict) {
   }
 }
 
-}  // namespace
-
-Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
+/// Why there is no estimate, in a verdict; none where there is one.
+std::optional<Verdict> refusal_of(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
   using Status = ObserveSolution::Status;
   if (report.status == Status::unobservable || report.status == Status::too_few_data) {
     Reason reason = reason_of(report, log, config);
@@ -238,25 +238,28 @@ Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, c
       report.gramian_lambda_min < fang_refuse_lambda) {
     return fang_refusal(report, log, reason_of(report, log, config));
   }
-  Verdict verdict;
-  add_checks(report, verdict);
-  add_scale_check(report, verdict);
-  add_size_check(report, config, verdict);
+  return std::nullopt;
+}
+
+/// "fx 700.1 ± 0.5 px, fy …", 3σ.
+std::string sentence_of(const ObserveSolution& report) {
+  const ObservedQuantity &fx = report.quantities[0], &fy = report.quantities[1];
+  return "fx " + text_of(fx.value, 5) + " ± " + text_of(3.0 * fx.sigma, 2) + " px, fy " + text_of(fy.value, 5) + " ± " +
+         text_of(3.0 * fy.sigma, 2) + " px (3σ) from " + std::to_string(report.rows_used) + " rows";
+}
+
+/// The state of the worst check, and its text as what to add.
+void adopt_worst_check(Verdict& verdict) {
   for (const Check& check : verdict.checks) {
     const bool speaks = check.state == State::care || check.state == State::bad;
     if (!speaks || check.state <= verdict.state) continue;
     verdict.state = check.state;
     verdict.to_add = check.text;
   }
-  const ObservedQuantity &fx = report.quantities[0], &fy = report.quantities[1];
-  verdict.sentence = "fx " + text_of(fx.value, 5) + " ± " + text_of(3.0 * fx.sigma, 2) + " px, fy " +
-                     text_of(fy.value, 5) + " ± " + text_of(3.0 * fy.sigma, 2) + " px (3σ) from " +
-                     std::to_string(report.rows_used) + " rows";
-  if (report.sigma_is_distance) {
-    heed({"σ", State::care, "the method states no σ: it is the distance from the adjustment of all rows", 0.0, 0.0, "",
-          "intrinsics"},
-         "use --method hybrid for a σ of its own", verdict);
-  }
+}
+
+/// The advice of more specific checks first: a cause, the rotation's noise; and the check of a misread rotation.
+void add_advice(const ObserveSolution& report, Verdict& verdict) {
   const auto cause = std::find_if(verdict.checks.begin(), verdict.checks.end(),
                                   [](const Check& check) { return check.name.starts_with("needs "); });
   const auto jitter = std::find_if(verdict.checks.begin(), verdict.checks.end(), [](const Check& check) {
@@ -270,6 +273,24 @@ Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, c
     verdict.state = State::bad;
     verdict.to_add = read.text;
   }
+}
+
+}  // namespace
+
+Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
+  if (std::optional<Verdict> refused = refusal_of(report, log, config)) return *std::move(refused);
+  Verdict verdict;
+  add_checks(report, verdict);
+  add_scale_check(report, verdict);
+  add_size_check(report, config, verdict);
+  adopt_worst_check(verdict);
+  verdict.sentence = sentence_of(report);
+  if (report.sigma_is_distance) {
+    heed({"σ", State::care, "the method states no σ: it is the distance from the adjustment of all rows", 0.0, 0.0, "",
+          "intrinsics"},
+         "use --method hybrid for a σ of its own", verdict);
+  }
+  add_advice(report, verdict);
   heed_assumptions(report.assumed, verdict);
   return verdict;
 }

@@ -77,6 +77,26 @@ TEST(Heads, IdentifiedWithinThreeSigma) {
   }
 }
 
+/// Drawn plants on which the search ended in a wrong minimum, a whole move given up (14: 25σ), and on which the
+/// encoder's period was off by 5e-5, a sample at the ends of the log (12: 5σ).
+TEST(Heads, DrawnPlantsAreIdentifiedWithinThreeSigma) {
+  for (const int seed : {12, 14}) {
+    const std::string plant = "seed=" + std::to_string(seed);
+    const SimulatedHeadConfig truth = simulated_head_config(plant, "test");
+    const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&" + plant);
+    for (const PositionerFit& axis : identify_head(*head).axes) {
+      expect_within(axis.rate, truth.axis.rate_rad_s, plant + " rate");
+      expect_within(axis.acceleration, truth.axis.acceleration_rad_s2, plant + " acceleration");
+      expect_within(axis.time_constant, truth.axis.time_constant_s, plant + " time constant");
+      const double sampling_s = truth.update_hz > 0.0 ? 0.5 / truth.update_hz : 0.0;
+      expect_within(axis.latency, truth.axis.latency_s + sampling_s, plant + " latency");
+      expect_within(axis.backlash, truth.axis.backlash_rad, plant + " backlash");
+      EXPECT_NEAR(axis.encoder_hz, truth.update_hz, 2e-5 * truth.update_hz) << plant;
+      EXPECT_LT(axis.rms_rad, 0.5 * truth.step_rad) << plant;
+    }
+  }
+}
+
 /// Of their logs `alidade identify` has the same model, without what the experiment knows: where it rested, and what
 /// the readings' steps and times are worth.
 TEST(Heads, IdentifyFindsTheSameAxisInTheirLogs) {

@@ -46,10 +46,13 @@ double first_latency(const PositionerLog& log) {
   return waits.empty() ? 0.05 : median_of(std::move(waits));
 }
 
-/// From the best points of a coarse grid: the cost has more than one local minimum.
-PositionerVector best_start(const PositionerProblem& problem, double rate, double latency, double& cost) {
+/// From the best points of a coarse grid: the cost has more than one local minimum. All readings count in full: where
+/// far ones count as their logarithm, a whole move can be given up for less than an encoder's sampling costs in all.
+PositionerVector best_start(const PositionerProblem& problem, double rate, double latency) {
   constexpr std::size_t num_starts = 4;
   constexpr int few_steps = 20;
+  PositionerProblem unbent = problem;
+  unbent.set_bend(1e300);
   std::vector<std::pair<double, PositionerVector>> grid;
   for (const double acceleration : {60.0, 120.0, 220.0, 400.0, 1e4})
     for (const double tau : {0.005, 0.05, 0.1, 0.15})
@@ -57,13 +60,13 @@ PositionerVector best_start(const PositionerProblem& problem, double rate, doubl
         PositionerVector theta;
         theta << std::log(std::max(rate, 1e-4)), std::log(acceleration * degree), std::log(tau), latency * share,
             0.05 * degree, 0.0;
-        grid.emplace_back(problem.misfit(theta).squaredNorm(), theta);
+        grid.emplace_back(unbent.misfit(theta).squaredNorm(), theta);
       }
   std::ranges::sort(grid, {}, &std::pair<double, PositionerVector>::first);
   PositionerVector best = grid.front().second;
-  cost = 1e300;
+  double cost = 1e300;
   const auto try_from = [&](PositionerVector theta) {
-    const double reached = problem.solve(theta, all_places, few_steps);
+    const double reached = unbent.solve(theta, all_places, few_steps);
     if (reached >= cost) return;
     cost = reached;
     best = theta;
@@ -171,26 +174,26 @@ void fill_gain(const PositionerLog& log, PositionerFit& fit) {
 }
 
 void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& cost, PositionerFit& fit) {
-  double period = 0.0, phase = 0.0;
-  if (!problem.find_sampling(theta, period, phase)) return;
+  constexpr int rounds = 4;
+  std::optional<EncoderSampling> sampling = problem.find_sampling(theta);
+  if (!sampling) return;
   const PositionerProblem as_asked = problem;
   const PositionerVector theta_as_asked = theta;
   const double cost_as_asked = cost;
-  theta[P::latency] = std::max(0.0, theta[P::latency] - 0.5 * period);
-  for (int round = 0; round < 3; ++round) {
+  theta[P::latency] = std::max(0.0, theta[P::latency] - 0.5 * sampling->period_s);
+  for (int round = 0; round < rounds; ++round) {
     problem = as_asked;
-    problem.set_sampling(period, phase, theta);
+    problem.set_sampling(*sampling, theta);
     cost = problem.solve(theta, all_places);
-    double again = 0.0, again_phase = 0.0;
-    // The remaining residuals of the request times determine the period better each time.
-    if (round < 2 && as_asked.find_sampling(theta, again, again_phase)) {
-      period = again;
-      phase = again_phase;
+    if (round == 0) {  // the residuals of the times of requests determine it better now
+      if (const auto again = as_asked.find_sampling(theta)) sampling = again;
+    } else if (round + 1 < rounds) {
+      sampling = problem.refined(*sampling, theta);
     }
   }
   fit.encoder_evidence = cost_as_asked - as_asked.misfit(theta).squaredNorm();
   if (cost < 2.0 * cost_as_asked) {
-    fit.encoder_hz = 1.0 / period;
+    fit.encoder_hz = 1.0 / sampling->period_s;
     return;
   }
   problem = as_asked;
@@ -272,9 +275,8 @@ PositionerFit fit_positioner(const PositionerLog& log) {
     return fit;
   }
   fit.fastest_rad_s = fastest(problem.readings());
-  double cost = 0.0;
-  PositionerVector theta = best_start(problem, fit.fastest_rad_s, first_latency(log), cost);
-  cost = problem.solve(theta, all_places);
+  PositionerVector theta = best_start(problem, fit.fastest_rad_s, first_latency(log));
+  double cost = problem.solve(theta, all_places);
   find_sampling(problem, theta, cost, fit);
   const double noise2 = std::max(1.0, cost / static_cast<double>(problem.size() - all_places.size()));
   fit.noise = std::sqrt(cost / static_cast<double>(problem.size() - all_places.size()));

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
@@ -35,41 +34,6 @@ std::vector<double> shared_roundings(const std::vector<PositionerReading>& readi
               static_cast<double>(j - i));
   }
   return shared;
-}
-
-/// Of Fourier's first harmonic in what is left, by frequency.
-struct Harmonic {
-  double power = 0.0, cosine = 0.0, sine = 0.0;
-};
-Harmonic harmonic_of(const std::vector<Eigen::Vector3d>& late, double hz) {  // (t, e, weight)
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  double sum = 0.0, sum_e = 0.0, sum_ee = 0.0;
-  for (const Eigen::Vector3d& each : late) {
-    const double phase = 2.0 * std::numbers::pi * hz * each[0];
-    const Eigen::Vector3d row(1.0, std::cos(phase), std::sin(phase));
-    normal += each[2] * row * row.transpose();
-    right += each[2] * each[1] * row;
-    sum += each[2];
-    sum_e += each[2] * each[1];
-    sum_ee += each[2] * each[1] * each[1];
-  }
-  const Eigen::Vector3d x = solve_symmetric(normal, right);
-  const double before = sum_ee - sum_e * sum_e / sum, after = sum_ee - x.dot(right);
-  return {before / std::max(after, 1e-12) - 1.0, x[1], x[2]};
-}
-
-/// Squares that a sawtooth of this period and phase leaves of the times by which readings are late.
-double sawtooth_cost(const std::vector<Eigen::Vector3d>& late, double period, double phase) {
-  double sum = 0.0, sum_e = 0.0, sum_ee = 0.0;
-  for (const Eigen::Vector3d& each : late) {
-    const double cycles = (each[0] - phase) / period;
-    const double e = each[1] - period * (cycles - std::floor(cycles));
-    sum += each[2];
-    sum_e += each[2] * e;
-    sum_ee += each[2] * e * e;
-  }
-  return sum_ee - sum_e * sum_e / sum;
 }
 
 }  // namespace
@@ -121,13 +85,11 @@ std::vector<double> PositionerProblem::response(const PositionerVector& theta, c
 std::vector<double> PositionerProblem::model(const PositionerVector& theta) const { return response(theta, times_); }
 
 Eigen::VectorXd PositionerProblem::misfit(const PositionerVector& theta) const {
-  constexpr double bend = 4.0;
   const std::vector<double> angles = model(theta);
   Eigen::VectorXd misfit(static_cast<Eigen::Index>(angles.size()));
   for (std::size_t i = 0; i < angles.size(); ++i) {
-    const double z = (angles[i] - readings_[i].angle_rad) / sigma_[i], size = std::abs(z);
-    misfit[static_cast<Eigen::Index>(i)] =
-        size <= bend ? z : std::copysign(bend * std::sqrt(1.0 + 2.0 * std::log(size / bend)), z);
+    const double z = (angles[i] - readings_[i].angle_rad) / sigma_[i];
+    misfit[static_cast<Eigen::Index>(i)] = bent(z, bend_);
   }
   return misfit;
 }
@@ -163,65 +125,32 @@ double PositionerProblem::solve(PositionerVector& theta, const std::vector<int>&
       .sum2;
 }
 
-bool PositionerProblem::find_sampling(const PositionerVector& theta, double& period_s, double& phase_s) const {
-  constexpr double slowest_hz = 3.0, fastest_hz = 120.0, min_gain = 0.5;
-  const std::vector<double> angles = response(theta, times_);
-  std::vector<Eigen::Vector3d> late;
-  for (std::size_t i = 0; i < size(); ++i) {
-    if (std::abs(rate_[i]) < 1.0 * degree || std::abs(rate_[i]) * 0.02 < 2.0 * sigma_[i]) continue;
-    const double e = (angles[i] - readings_[i].angle_rad) / rate_[i], sigma = sigma_[i] / std::abs(rate_[i]) + 1e-3;
-    if (std::abs(e) < 0.4) late.emplace_back(readings_[i].t_s, e, 1.0 / (sigma * sigma));
+AxisReadings PositionerProblem::axis_readings(const PositionerVector& theta) const {
+  AxisReadings all{{}, {}, sigma_, [this, theta](const std::vector<double>& times) { return response(theta, times); }};
+  for (const PositionerReading& reading : readings_) {
+    all.t_s.push_back(reading.t_s);
+    all.angle_rad.push_back(reading.angle_rad);
   }
-  if (late.size() < 60) return false;
-  const double step_hz = 0.2 / (late.back()[0] - late.front()[0] + 1.0);
-  double best = 0.0, best_hz = 0.0;
-  for (double hz = slowest_hz; hz < fastest_hz; hz += step_hz) {
-    const double power = harmonic_of(late, hz).power;
-    if (power > best) {
-      best = power;
-      best_hz = hz;
-    }
-  }
-  if (best < min_gain) return false;
-  const Harmonic found = harmonic_of(late, best_hz);
-  const double amplitude = std::hypot(found.cosine, found.sine) * std::numbers::pi * best_hz;  // 1 of a full sawtooth
-  if (amplitude < 0.5 || amplitude > 1.6) return false;
-  double least = 1e300;
-  for (int i = -12; i <= 12; ++i) {
-    const double period = 1.0 / (best_hz + step_hz * i / 6.0);
-    for (int k = 0; k < 100; ++k) {
-      const double phase = period * k / 100.0, cost = sawtooth_cost(late, period, phase);
-      if (cost >= least) continue;
-      least = cost;
-      period_s = period;
-      phase_s = phase;
-    }
-  }
-  return least < 0.5 * sawtooth_cost(late, 1e-9, 0.0);
+  return all;
 }
 
-void PositionerProblem::set_sampling(double period_s, double phase_s, const PositionerVector& theta) {
-  constexpr double edge_s = 1.5e-3;
-  std::vector<double> other(size());
-  for (std::size_t i = 0; i < size(); ++i) {
-    const double t = readings_[i].t_s, cycle = std::floor((t - phase_s) / period_s);
-    times_[i] = phase_s + cycle * period_s;
-    const double into = t - times_[i], edge = edge_s + 0.5 * readings_[i].wait_s;
-    other[i] = into < edge ? times_[i] - period_s : period_s - into < edge ? times_[i] + period_s : times_[i];
-  }
-  const std::vector<double> first = response(theta, times_);
-  std::vector<double> sorted = other;
-  std::vector<std::size_t> order(size());
-  for (std::size_t i = 0; i < size(); ++i) order[i] = i;
-  std::ranges::sort(order, {}, [&](std::size_t i) { return other[i]; });
-  std::ranges::sort(sorted);
-  const std::vector<double> second = response(theta, sorted);
-  for (std::size_t i = 0; i < size(); ++i) {
-    const std::size_t at = order[i];
-    if (std::abs(second[i] - readings_[at].angle_rad) < std::abs(first[at] - readings_[at].angle_rad))
-      times_[at] = other[at];
-  }
-  for (std::size_t i = 1; i < size(); ++i) times_[i] = std::max(times_[i], times_[i - 1]);
+std::optional<EncoderSampling> PositionerProblem::find_sampling(const PositionerVector& theta) const {
+  return found_sampling(axis_readings(theta));
+}
+
+EncoderSampling PositionerProblem::refined(const EncoderSampling& sampling, PositionerVector& theta) const {
+  const EncoderSampling better = refined_sampling(axis_readings(theta), sampling);
+  const double shift_s = better.phase_s - sampling.last_s(better.phase_s);
+  theta[PositionerPlace::latency] =
+      std::max(0.0, theta[PositionerPlace::latency] +
+                        (shift_s < 0.5 * sampling.period_s ? shift_s : shift_s - sampling.period_s));
+  return better;
+}
+
+void PositionerProblem::set_sampling(const EncoderSampling& sampling, const PositionerVector& theta) {
+  std::vector<double> edges_s;
+  for (const PositionerReading& reading : readings_) edges_s.push_back(0.5 * reading.wait_s);
+  times_ = sample_times(axis_readings(theta), sampling, edges_s);
   // When it was asked no longer counts, only when it was sampled.
   for (std::size_t i = 0; i < size(); ++i)
     sigma_[i] = std::max(1e-7, std::hypot(step_rad_ * std::sqrt(shared_[i] / 12.0), rate_[i] * 0.25 * clock_sigma_s));

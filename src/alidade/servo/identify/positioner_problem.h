@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
+#include "alidade/servo/identify/encoder_sampling.h"
 #include "alidade/servo/identify/positioner_fit.h"
 
 namespace alidade {
@@ -21,18 +23,23 @@ class PositionerProblem {
   PositionerProblem(const PositionerLog& log, double step_rad, double dead_band_rad);
 
   [[nodiscard]] std::size_t size() const { return readings_.size(); }
-  /// (model − reading) / σ, beyond 4σ as far as its logarithm.
+  /// (model − reading) / σ, beyond `bend` σ as far as its logarithm.
   [[nodiscard]] Eigen::VectorXd misfit(const PositionerVector& theta) const;
   [[nodiscard]] std::vector<double> model(const PositionerVector& theta) const;
   /// By central differences; columns of fixed parameters are zero.
   [[nodiscard]] Eigen::MatrixXd jacobian(const PositionerVector& theta, const std::vector<int>& free) const;
   /// Minimises from `theta` over the free parameters; the sum of squares.
   double solve(PositionerVector& theta, const std::vector<int>& free, int max_steps = 60) const;
+  /// A start is searched for without a bend: what is far off would count for nothing, and a wrong minimum hold.
+  void set_bend(double sigmas) { bend_ = sigmas; }
 
-  /// The encoder is sampled so often from that time on; readings are of its samples.
-  void set_sampling(double period_s, double phase_s, const PositionerVector& theta);
-  /// Searches the residuals for the encoder's sampling; false: none.
-  bool find_sampling(const PositionerVector& theta, double& period_s, double& phase_s) const;
+  /// Readings are of the encoder's samples.
+  void set_sampling(const EncoderSampling& sampling, const PositionerVector& theta);
+  /// Searches the residuals for the encoder's sampling; none: it is read when it is asked.
+  [[nodiscard]] std::optional<EncoderSampling> find_sampling(const PositionerVector& theta) const;
+  /// The sampling near this one, with which `theta` was fitted, that puts the fewest readings into another sample; the
+  /// latency of `theta` follows its phase.
+  [[nodiscard]] EncoderSampling refined(const EncoderSampling& sampling, PositionerVector& theta) const;
 
   [[nodiscard]] const std::vector<PositionerReading>& readings() const { return readings_; }
   [[nodiscard]] const std::vector<double>& rates() const { return rate_; }
@@ -41,12 +48,13 @@ class PositionerProblem {
 
  private:
   [[nodiscard]] std::vector<double> response(const PositionerVector& theta, const std::vector<double>& times) const;
+  [[nodiscard]] AxisReadings axis_readings(const PositionerVector& theta) const;
 
   std::vector<PositionCommand> commands_;
   std::vector<PositionerReading> readings_;
   std::vector<double> times_, rate_, sigma_, shared_;
   std::vector<int> move_;
-  double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0;
+  double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0, bend_ = 4.0;
 };
 
 }  // namespace alidade

@@ -111,11 +111,17 @@ std::string camera_fault_of(const MovingTargetReport& report, std::span<const Ta
   const auto exchanges = exchanges_of(heads, doubtful ? 0.0 : plainly);
   if (!doubtful && (exchanges.empty() || exchanges.size() > few)) return "";
   // All cameras are located, and so are their clocks: they are not searched again.
-  const std::vector<TargetObservation> some =
-      central_minute(doubtful ? std::vector<TargetObservation>(observations.begin(), observations.end())
-                              : by_one_clock(report, observations));
+  const std::vector<TargetObservation> all =
+      doubtful ? std::vector<TargetObservation>(observations.begin(), observations.end())
+               : by_one_clock(report, observations);
+  std::vector<TargetObservation> some = central_minute(all);
   const std::vector<RigHead> given(heads.begin(), heads.end());
-  const Agreement as_given = agreement_of(place(some, given, doubtful));
+  Agreement as_given = agreement_of(place(some, given, doubtful));
+  // A minute may not locate cameras that all observations do: what is exchanged is compared with the same.
+  if (const Agreement in_all = agreement_of(report); in_all.num_placed > as_given.num_placed) {
+    some = all;
+    as_given = in_all;
+  }
   Best best;
   for (std::size_t h = 0; doubtful && h < given.size() && (given.size() > 2 || h == 0); ++h) {
     const std::string words = given.size() == 2 ? "one of the two cameras gives mirrored images"

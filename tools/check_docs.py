@@ -11,7 +11,7 @@ import sys
 
 SOURCES = {".h", ".cpp", ".py", ".ts", ".mjs", ".sh", ".S", ".in"}
 FOLDERS = ("src", "cli", "tools", "python", "web", "bench", "fuzz", "examples", "cmake", "debian", "docs")
-PLACEHOLDER = re.compile(r"\bx(_test)?\.\w+$|[*{}]|[A-Z]{3,}")  # `x.cpp`, `*_test.cpp`, `ROOM.h`
+NO_FILE = re.compile(r"\bx(_test)?\.\w+$|[*{}]|[A-Z]{3,}")  # `x.cpp`, `*_test.cpp`, `ROOM.h`
 NOT_READ = {"CHANGELOG.md", "reference.md"}  # of the past, and generated
 
 
@@ -94,7 +94,7 @@ def line_faults(page, line, names, known_tests, alidade):
         yield link_fault(page, link)
     for code in re.findall(r"`([^`]+)`", line):
         for name in re.findall(r"[\w./{}*-]+\.\w+\b", code):
-            if pathlib.Path(name).suffix in SOURCES and not PLACEHOLDER.search(name) and name not in names:
+            if pathlib.Path(name).suffix in SOURCES and not NO_FILE.search(name) and name not in names:
                 yield f"names {name}, which is not there"
         yield test_fault(code, known_tests)
     if alidade:

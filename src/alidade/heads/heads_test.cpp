@@ -53,6 +53,16 @@ void expect_within(const PositionerValue& value, double truth, const std::string
   EXPECT_GT(value.sigma, 0.0) << what;
 }
 
+/// All that moves an axis but its dead band.
+void expect_motion_within(const PositionerFit& axis, const SimulatedHeadConfig& truth, const std::string& plant) {
+  expect_within(axis.rate, truth.axis.rate_rad_s, plant + " rate");
+  expect_within(axis.acceleration, truth.axis.acceleration_rad_s2, plant + " acceleration");
+  expect_within(axis.time_constant, truth.axis.time_constant_s, plant + " time constant");
+  const double sampling_s = truth.update_hz > 0.0 ? 0.5 / truth.update_hz : 0.0;  // a reading is that old on average
+  expect_within(axis.latency, truth.axis.latency_s + sampling_s, plant + " latency");
+  expect_within(axis.backlash, truth.axis.backlash_rad, plant + " backlash");
+}
+
 TEST(Heads, IdentifiedWithinThreeSigma) {
   for (const std::string plant :
        {"rate=33&accel=210&tau=0.07&latency=0.05&backlash=0.2&dead_band=0.08&step=0.01",
@@ -64,12 +74,7 @@ TEST(Heads, IdentifiedWithinThreeSigma) {
     EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
     EXPECT_LT(result.head_time_s, 90.0);
     for (const PositionerFit& axis : result.axes) {
-      expect_within(axis.rate, truth.axis.rate_rad_s, plant + " rate");
-      expect_within(axis.acceleration, truth.axis.acceleration_rad_s2, plant + " acceleration");
-      expect_within(axis.time_constant, truth.axis.time_constant_s, plant + " time constant");
-      const double sampling_s = truth.update_hz > 0.0 ? 0.5 / truth.update_hz : 0.0;
-      expect_within(axis.latency, truth.axis.latency_s + sampling_s, plant + " latency");
-      expect_within(axis.backlash, truth.axis.backlash_rad, plant + " backlash");
+      expect_motion_within(axis, truth, plant);
       expect_within(axis.dead_band, truth.axis.dead_band_rad, plant + " dead band");
       EXPECT_NEAR(axis.resolution.value, truth.step_rad, 0.05 * truth.step_rad) << plant;
       EXPECT_EQ(axis.backlash.is_asked_for, truth.axis.backlash_rad > 0.0) << plant;
@@ -85,12 +90,7 @@ TEST(Heads, DrawnPlantsAreIdentifiedWithinThreeSigma) {
     const SimulatedHeadConfig truth = simulated_head_config(plant, "test");
     const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&" + plant);
     for (const PositionerFit& axis : identify_head(*head).axes) {
-      expect_within(axis.rate, truth.axis.rate_rad_s, plant + " rate");
-      expect_within(axis.acceleration, truth.axis.acceleration_rad_s2, plant + " acceleration");
-      expect_within(axis.time_constant, truth.axis.time_constant_s, plant + " time constant");
-      const double sampling_s = truth.update_hz > 0.0 ? 0.5 / truth.update_hz : 0.0;
-      expect_within(axis.latency, truth.axis.latency_s + sampling_s, plant + " latency");
-      expect_within(axis.backlash, truth.axis.backlash_rad, plant + " backlash");
+      expect_motion_within(axis, truth, plant);
       EXPECT_NEAR(axis.encoder_hz, truth.update_hz, 2e-5 * truth.update_hz) << plant;
       EXPECT_LT(axis.rms_rad, 0.5 * truth.step_rad) << plant;
     }

@@ -64,9 +64,9 @@ std::vector<Eigen::Vector3d> lateness(const AxisReadings& readings) {
 }
 
 /// A model between the times at which it was computed once.
-class Course {
+class SampledModel {
  public:
-  Course(const AxisReadings& readings, double margin_s)
+  SampledModel(const AxisReadings& readings, double margin_s)
       : begin_s_(readings.t_s.front() - margin_s),
         step_s_(std::max(least_step_s, (readings.t_s.back() - begin_s_ + margin_s) / max_points)) {
     std::vector<double> times;
@@ -91,9 +91,9 @@ class Course {
 double EncoderSampling::cycle(double t_s) const { return std::floor((t_s - phase_s) / period_s); }
 double EncoderSampling::last_s(double t_s) const { return phase_s + cycle(t_s) * period_s; }
 
-double bent(double z, double bend) {
+double robust_residual(double z, double threshold) {
   const double size = std::abs(z);
-  return size <= bend ? z : std::copysign(bend * std::sqrt(1.0 + 2.0 * std::log(size / bend)), z);
+  return size <= threshold ? z : std::copysign(threshold * std::sqrt(1.0 + 2.0 * std::log(size / threshold)), z);
 }
 
 std::optional<EncoderSampling> found_sampling(const AxisReadings& readings) {
@@ -130,9 +130,9 @@ std::optional<EncoderSampling> found_sampling(const AxisReadings& readings) {
 }
 
 EncoderSampling refined_sampling(const AxisReadings& readings, const EncoderSampling& given) {
-  constexpr double bend = 4.0, first_s = 4e-3, closer = 0.2, same = 1.0;
+  constexpr double threshold = 4.0, first_s = 4e-3, closer = 0.2, same = 1.0;
   constexpr int half = 10, rounds = 4;
-  const Course course(readings, 2.0 * given.period_s);
+  const SampledModel sampled(readings, 2.0 * given.period_s);
   const double begin_s = readings.t_s.front(), end_s = readings.t_s.back();
   const double middle_s = given.last_s(0.5 * (begin_s + end_s));
   const double cycles = std::max(1.0, 0.5 * (end_s - begin_s) / given.period_s);
@@ -141,7 +141,8 @@ EncoderSampling refined_sampling(const AxisReadings& readings, const EncoderSamp
     double cost = 0.0;
     for (std::size_t i = 0; i < readings.t_s.size(); ++i) {
       const double sample_s = middle_s + period * std::floor((readings.t_s[i] - middle_s - shift) / period);
-      const double z = bent((course.at(sample_s) - readings.angle_rad[i]) / readings.sigma_rad[i], bend);
+      const double z =
+          robust_residual((sampled.at(sample_s) - readings.angle_rad[i]) / readings.sigma_rad[i], threshold);
       cost += z * z;
     }
     return cost;

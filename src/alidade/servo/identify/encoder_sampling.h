@@ -33,7 +33,7 @@ struct AxisReadings {
 [[nodiscard]] std::vector<double> sample_times(const AxisReadings& readings, const EncoderSampling& sampling,
                                                const std::vector<double>& edges_s);
 
-/// Squares that count beyond `bend` only as their logarithm.
-[[nodiscard]] double bent(double z, double bend);
+/// Squares that count beyond `threshold` only as their logarithm.
+[[nodiscard]] double robust_residual(double z, double threshold);
 
 }  // namespace alidade

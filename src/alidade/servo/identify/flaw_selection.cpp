@@ -73,7 +73,7 @@ Candidate limited(std::span<const ServoSample> log, const ServoFit& fit) {
   return best;
 }
 
-double colour_of(const Eigen::VectorXd& misfit) {
+double lag_one_correlation(const Eigen::VectorXd& misfit) {
   const Index n = misfit.size();
   return misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300);
 }
@@ -116,7 +116,7 @@ void note_rivals(std::span<const ServoSample> log, const std::vector<Candidate>&
 ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std::span<const std::size_t> flaws,
                     std::vector<ServoRival>& rivals) {
   constexpr std::size_t max_freed = 3;
-  constexpr double max_colour = 0.3;
+  constexpr double max_correlation = 0.3;
   ServoFit fit = plain;
   while (fit.freed.size() < max_freed) {
     const FlawGround ground = flaw_ground(log, fit);
@@ -129,9 +129,9 @@ ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std
     const Candidate& best = candidates.front();
     const Evidence single = evidence_for(log, sum2, 1.0, best);
     const bool is_better = single.left > 0.0;
-    const double colour = colour_of(flawed_misfit(log, is_better ? best.fit : fit));
+    const double correlation = lag_one_correlation(flawed_misfit(log, is_better ? best.fit : fit));
     if (fit.kind == ServoKind::angle && !is_limited(fit) && fit.freed.size() + 2 <= max_freed &&
-        std::abs(colour) > max_colour) {
+        std::abs(correlation) > max_correlation) {
       const Candidate pair = limited(log, fit);
       if (evidence_for(log, is_better ? best.sum2 : sum2, is_better ? 1.0 : 2.0, pair).left > 0.0) {
         fit = taken(fit, pair.fit, evidence_for(log, sum2, 2.0, pair).size);

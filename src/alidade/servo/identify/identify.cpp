@@ -194,12 +194,12 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
 
 /// Which flaws to try: all where the residuals of a linear fit indicate one, the clock alone where only that is.
 std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
-  constexpr double max_colour = 0.3, min_sigmas = 3.5;
+  constexpr double max_correlation = 0.3, min_sigmas = 3.5;
   const FlawGround ground = flaw_ground(log, fit);
   const std::vector<double> residuals(ground.misfit.data(), ground.misfit.data() + ground.misfit.size());
   std::vector<std::size_t> all(num_servo_flaws);
   std::iota(all.begin(), all.end(), 0);
-  if (std::abs(lag_one(residuals)) > max_colour) return all;
+  if (std::abs(lag_one(residuals)) > max_correlation) return all;
   const double sum2 = ground.misfit.squaredNorm(), least2 = min_sigmas * min_sigmas * fit.rms_rad * fit.rms_rad;
   std::vector<std::size_t> indicated;
   for (const std::size_t flaw : all)

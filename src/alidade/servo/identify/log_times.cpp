@@ -22,10 +22,10 @@ TimeVariance time_variance(const ServoIdentification& result, const Eigen::Vecto
   const double spread = rate2.square().sum();
   if (!(spread > 0.0) || !(square.square().sum() > 0.0)) return {};
   // Squares of neighbouring residuals are correlated by the square of what these are.
-  const double colour = std::min(
+  const double correlation = std::min(
       0.95, std::pow((residual.head(n - 1) * residual.tail(n - 1)).sum(), 2) / std::pow(residual.square().sum(), 2));
   const double slope = (square * rate2).sum() / spread;
-  const double sigma = std::sqrt(square.square().mean() / spread * (1.0 + colour) / (1.0 - colour));
+  const double sigma = std::sqrt(square.square().mean() / spread * (1.0 + correlation) / (1.0 - correlation));
   return {slope, slope / sigma};
 }
 

@@ -51,8 +51,8 @@ double first_latency(const PositionerLog& log) {
 PositionerVector best_start(const PositionerProblem& problem, double rate, double latency) {
   constexpr std::size_t num_starts = 4;
   constexpr int few_steps = 20;
-  PositionerProblem unbent = problem;
-  unbent.set_bend(1e300);
+  PositionerProblem quadratic = problem;
+  quadratic.set_threshold(1e300);
   std::vector<std::pair<double, PositionerVector>> grid;
   for (const double acceleration : {60.0, 120.0, 220.0, 400.0, 1e4})
     for (const double tau : {0.005, 0.05, 0.1, 0.15})
@@ -60,13 +60,13 @@ PositionerVector best_start(const PositionerProblem& problem, double rate, doubl
         PositionerVector theta;
         theta << std::log(std::max(rate, 1e-4)), std::log(acceleration * degree), std::log(tau), latency * share,
             0.05 * degree, 0.0;
-        grid.emplace_back(unbent.misfit(theta).squaredNorm(), theta);
+        grid.emplace_back(quadratic.misfit(theta).squaredNorm(), theta);
       }
   std::ranges::sort(grid, {}, &std::pair<double, PositionerVector>::first);
   PositionerVector best = grid.front().second;
   double cost = 1e300;
   const auto try_from = [&](PositionerVector theta) {
-    const double reached = unbent.solve(theta, all_places, few_steps);
+    const double reached = quadratic.solve(theta, all_places, few_steps);
     if (reached >= cost) return;
     cost = reached;
     best = theta;

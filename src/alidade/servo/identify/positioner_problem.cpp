@@ -89,7 +89,7 @@ Eigen::VectorXd PositionerProblem::misfit(const PositionerVector& theta) const {
   Eigen::VectorXd misfit(static_cast<Eigen::Index>(angles.size()));
   for (std::size_t i = 0; i < angles.size(); ++i) {
     const double z = (angles[i] - readings_[i].angle_rad) / sigma_[i];
-    misfit[static_cast<Eigen::Index>(i)] = bent(z, bend_);
+    misfit[static_cast<Eigen::Index>(i)] = robust_residual(z, threshold_);
   }
   return misfit;
 }

@@ -23,15 +23,15 @@ class PositionerProblem {
   PositionerProblem(const PositionerLog& log, double step_rad, double dead_band_rad);
 
   [[nodiscard]] std::size_t size() const { return readings_.size(); }
-  /// (model − reading) / σ, beyond `bend` σ as far as its logarithm.
+  /// (model − reading) / σ, beyond the threshold as far as its logarithm.
   [[nodiscard]] Eigen::VectorXd misfit(const PositionerVector& theta) const;
   [[nodiscard]] std::vector<double> model(const PositionerVector& theta) const;
   /// By central differences; columns of fixed parameters are zero.
   [[nodiscard]] Eigen::MatrixXd jacobian(const PositionerVector& theta, const std::vector<int>& free) const;
   /// Minimises from `theta` over the free parameters; the sum of squares.
   double solve(PositionerVector& theta, const std::vector<int>& free, int max_steps = 60) const;
-  /// A start is searched for without a bend: what is far off would count for nothing, and a wrong minimum hold.
-  void set_bend(double sigmas) { bend_ = sigmas; }
+  /// A start is searched for without a threshold: what is far off would count for nothing, and a wrong minimum hold.
+  void set_threshold(double sigmas) { threshold_ = sigmas; }
 
   /// Readings are of the encoder's samples.
   void set_sampling(const EncoderSampling& sampling, const PositionerVector& theta);
@@ -54,7 +54,7 @@ class PositionerProblem {
   std::vector<PositionerReading> readings_;
   std::vector<double> times_, rate_, sigma_, shared_;
   std::vector<int> move_;
-  double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0, bend_ = 4.0;
+  double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0, threshold_ = 4.0;
 };
 
 }  // namespace alidade

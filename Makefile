@@ -103,8 +103,8 @@ docs: demo
 	@$(out)/alidade simulate underwater --video --camera build/demo/tour/truth_camera.yaml --rate 30 --frames 30 --out build/demo/dive --quiet
 	@$(out)/alidade localize build/demo/dive/frames --rate 30 --camera build/demo/tour-camera/camera.yaml \
 	  --target build/demo/dive/target.yaml --truth build/demo/dive/truth.tum --out build/demo/path --quiet
-	@node web/test/picture.mjs build/demo/tour-camera/report.html docs/tour/camera.png 1500x770 0.6
-	@node web/test/picture.mjs build/demo/path/report.html docs/tour/path.png 1500x770 0.6
+	@node web/test/screenshot.mjs build/demo/tour-camera/report.html docs/tour/camera.png 1500x770 0.6
+	@node web/test/screenshot.mjs build/demo/path/report.html docs/tour/path.png 1500x770 0.6
 	@echo "docs: docs/rangefinder.png, rig.png, track.png, servo.png"
 	@$(out)/alidade simulate rangefinder --photos --shots 12 --out build/demo/shots --quiet
 	@$(out)/alidade rangefinder build/demo/shots/shots.csv --camera build/demo/shots/camera.yaml --board 9x6 --square 0.04 \
@@ -117,10 +117,10 @@ docs: demo
 	  --out build/demo/track --quiet
 	@$(out)/alidade simulate servo --out build/demo/loop --quiet
 	@$(out)/alidade servo build/demo/loop/scenario.yaml --out build/demo/servo --quiet
-	@node web/test/picture.mjs build/demo/beam/report.html docs/rangefinder.png 1500x760 0.6
-	@node web/test/picture.mjs build/demo/rig/report.html docs/rig.png 1500x740 0.6
-	@node web/test/picture.mjs build/demo/track/report.html docs/track.png 1500x740 0.6
-	@node web/test/picture.mjs build/demo/servo/report.html docs/servo.png 1500x690 0.6
+	@node web/test/screenshot.mjs build/demo/beam/report.html docs/rangefinder.png 1500x760 0.6
+	@node web/test/screenshot.mjs build/demo/rig/report.html docs/rig.png 1500x740 0.6
+	@node web/test/screenshot.mjs build/demo/track/report.html docs/track.png 1500x740 0.6
+	@node web/test/screenshot.mjs build/demo/servo/report.html docs/servo.png 1500x690 0.6
 
 study:
 	@tools/setup build

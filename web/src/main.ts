@@ -4,7 +4,7 @@ import {charts} from './core/chart';
 import {readDocument, type Doc} from './core/document';
 import {el} from './core/dom';
 import type {Figure} from './core/figure';
-import {findPictures} from './core/images';
+import {findImages} from './core/images';
 import {Selection} from './core/selection';
 import {views3} from './core/view3';
 import {figuresOf} from './figures/all';
@@ -36,14 +36,14 @@ function drawFigure(figure: Figure, doc: Doc, selection: Selection, host: HTMLEl
   }
 }
 
-const mostAtOnce_ms = 600; // of drawing, before the browser may show what stands and listen to its user
+const maxAtOnce_ms = 600; // of drawing, before the browser may show what stands and listen to its user
 
 /** One by one, and between them the browser shows what there is: the answer is read while the rest is drawn. */
 async function drawFigures(figures: Figure[], draw: (figure: Figure) => void): Promise<void> {
   let begun = performance.now();
   for (const figure of figures) {
     draw(figure);
-    if (performance.now() - begun < mostAtOnce_ms) continue;
+    if (performance.now() - begun < maxAtOnce_ms) continue;
     await new Promise((shown) => {
       requestAnimationFrame(() => setTimeout(shown));
       setTimeout(shown, 200); // a page in the background has no frames
@@ -81,7 +81,7 @@ const documentIsRead = new Promise<void>((read) => {
 async function start(): Promise<void> {
   const doc = readDocument(document.getElementById('result')?.textContent ?? '');
   const host = document.getElementById('page')!;
-  void documentIsRead.then(findPictures);
+  void documentIsRead.then(findImages);
   listenToPrinting();
   if (isCapture(doc)) showCapture(doc, host, (result) => void showReport(result, host));
   else if (isLive(doc)) showLive(doc, host, (result) => void showReport(result, host));

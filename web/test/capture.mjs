@@ -156,7 +156,7 @@ async function theKeyboardAloneSteersIt({alidade}) {
     const second = await opened(browser, run.url);
     await second.becomes('watching');
     assert.ok(await second.page.isDisabled('#take'));
-    assert.match(await second.page.textContent('.capture-none'), /in the page in control/);
+    await until('it says where the image is', async () => /in the page in control/.test(await second.page.textContent('.capture-none')), 10_000);
     await second.page.keyboard.press('?');
     const keys = await second.page.locator('dialog.help kbd').allTextContents();
     assert.deepEqual(keys, ['space', 'u', 'p', 'Enter', 'm', 'd', 'Esc', '?']);
@@ -318,7 +318,7 @@ async function shotsOfARangefinderAreGuided({alidade, browser}) {
       const before = await shown.page.evaluate(() => window.alidade.page.view.drawings);
       const name = rows[i][column('photo')], bytes = readFileSync(join(made, name));
       writeFileSync(join(incoming, `${String(i).padStart(3, '0')}.png`), bytes);
-      await until('the picture', async () => (await shown.page.evaluate(() => window.alidade.page.view.drawings)) > before && /hold it still/.test(await shown.page.textContent('.capture-advice')));
+      await until('the image', async () => (await shown.page.evaluate(() => window.alidade.page.view.drawings)) > before && /hold it still/.test(await shown.page.textContent('.capture-advice')));
       await shown.page.keyboard.press(' '); // to the field
       await shown.page.keyboard.type(rows[i][column('range_m')]);
       await shown.page.keyboard.press('Enter');

@@ -10,17 +10,17 @@ export const folder = mkdtempSync(join(tmpdir(), 'alidade-pages-'));
 
 const escaped = (text) => text.replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;').replace(/"/g, '&quot;');
 
-/** The same steps as report/page.cpp. `pictures`: {name: bytes of a JPEG}. */
-export function pageText(template, json, pictures = {}) {
-  const blocks = Object.entries(pictures).map(([name, bytes], i) =>
+/** The same steps as report/page.cpp. `images`: {name: bytes of a JPEG}. */
+export function pageText(template, json, images = {}) {
+  const blocks = Object.entries(images).map(([name, bytes], i) =>
     `<script type="text/plain" id="image-${i}" data-name="${escaped(name)}">${Buffer.from(bytes).toString('base64')}</script>`);
   return template.replace('@TITLE@', () => 'alidade').replace('@RESULT@', () => json.replace(/</g, '\\u003c')).replace('@PICTURES@', () => blocks.join('\n'));
 }
 
 let made = 0;
-export function pageFile(template, document, pictures = {}) {
+export function pageFile(template, document, images = {}) {
   const file = join(folder, `page-${++made}.html`);
-  writeFileSync(file, pageText(template, typeof document === 'string' ? document : JSON.stringify(document), pictures));
+  writeFileSync(file, pageText(template, typeof document === 'string' ? document : JSON.stringify(document), images));
   return pathToFileURL(file).href;
 }
 

@@ -28,7 +28,7 @@ else if (hasAll) console.log('web: without the executable only made-up documents
 const browser = await launch(), failures = [];
 const context = {
   browser, template, documents, alidade,
-  url: (document, pictures) => pageFile(template, document, pictures),
+  url: (document, images) => pageFile(template, document, images),
   urlOf: (name) => (documents[name].report ? pathToFileURL(documents[name].report).href : pageFile(template, documents[name].document)),
   open: (url, options) => opened(browser, url, options),
   calibration: calibrateDocument,

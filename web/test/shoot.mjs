@@ -1,4 +1,4 @@
-// Pictures of pages, to be looked at: node shoot.mjs TEMPLATE OUT [WIDTHS [THEMES]] RESULT.json[:PHOTOS]...
+// Images of pages, to be looked at: node shoot.mjs TEMPLATE OUT [WIDTHS [THEMES]] RESULT.json[:PHOTOS]...
 import {mkdirSync, readdirSync, readFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {launch, opened, pageFile, settled} from './page.mjs';
@@ -7,9 +7,9 @@ const [template, out, widths, themes, ...results] = process.argv.slice(2);
 mkdirSync(out, {recursive: true});
 const text = readFileSync(template, 'utf8'), browser = await launch();
 for (const result of results) {
-  const [file, photos] = result.split(':'), pictures = {};
-  if (photos) for (const name of readdirSync(photos)) if (/\.jpe?g$/.test(name)) pictures[name] = readFileSync(join(photos, name));
-  const url = pageFile(text, readFileSync(file, 'utf8'), pictures), name = file.split('/').at(-2) ?? 'page';
+  const [file, photos] = result.split(':'), images = {};
+  if (photos) for (const name of readdirSync(photos)) if (/\.jpe?g$/.test(name)) images[name] = readFileSync(join(photos, name));
+  const url = pageFile(text, readFileSync(file, 'utf8'), images), name = file.split('/').at(-2) ?? 'page';
   for (const width of widths.split(','))
     for (const theme of themes.split(',')) {
       const {page, faults, close} = await opened(browser, url, {width: Number(width), theme});

@@ -6,8 +6,8 @@ import {settled} from './page.mjs';
 const evil = '<img src=x onerror="window.harmed=1">"\'</script><script>window.harmed=1</script>\u2028__proto__';
 
 /** Opens a document and expects a page without faults. */
-async function survives({open, url}, document, pictures = {}, isWhole = true) {
-  const {page, faults, close} = await open(url(document, pictures));
+async function survives({open, url}, document, images = {}, isWhole = true) {
+  const {page, faults, close} = await open(url(document, images));
   if (isWhole) await settled(page); // 3-D as well
   const found = {faults, failed: await page.locator('[data-failed]').allInnerTexts(), harmed: await page.evaluate(() => window.harmed ?? 0), images: await page.locator('img[src="x"]').count(),
     cards: await page.locator('main > .card').count(), text: await page.locator('body').innerText()};
@@ -54,11 +54,11 @@ async function aHundredThousandRowsOpen(context) {
   assert.ok(Date.now() - start < 12_000, `${Date.now() - start} ms`);
 }
 
-/** Readable, with its first picture: two seconds. */
+/** Readable, with its first image: two seconds. */
 async function fiveHundredPhotosOpenInTwoSeconds({open, url}) {
-  const document = calibrateDocument(500), pictures = {};
-  for (const name of document.data.photos.name) pictures[name] = Buffer.alloc(10_000, 65);
-  const address = url(document, pictures), {page, faults, close} = await open('about:blank');
+  const document = calibrateDocument(500), images = {};
+  for (const name of document.data.photos.name) images[name] = Buffer.alloc(10_000, 65);
+  const address = url(document, images), {page, faults, close} = await open('about:blank');
   const start = Date.now();
   await page.goto(address, {waitUntil: 'commit'});
   await page.waitForFunction(() => document.documentElement.dataset.ready === '1' && document.querySelectorAll('main > .card').length > 5);

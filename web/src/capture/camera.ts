@@ -1,6 +1,6 @@
-// The browser's camera: its newest picture as grey values, exact where the browser hands over what the camera gave.
+// The browser's camera: its newest image as grey values, exact where the browser hands over what the camera gave.
 
-export interface Picture {
+export interface GreyImage {
   width: number;
   height: number;
   isExact: boolean;
@@ -27,7 +27,7 @@ export class Camera {
   static async open(video: HTMLVideoElement, gone: () => void): Promise<Camera> {
     if (!navigator.mediaDevices) throw new Error('this browser has no cameras, or gives none to this address');
     const known = navigator.mediaDevices.getSupportedConstraints() as Record<string, boolean>;
-    // As the camera has it: a picture that is scaled is another camera's.
+    // As the camera has it: an image that is scaled is another camera's.
     const asked: MediaTrackConstraints & {resizeMode?: unknown} = {...largest};
     if (known['resizeMode']) asked.resizeMode = {exact: 'none'};
     const stream = await navigator.mediaDevices.getUserMedia({video: asked, audio: false}), [track] = stream.getVideoTracks();
@@ -69,8 +69,8 @@ export class Camera {
     }
   }
 
-  /** The next picture; null where there is none any more. */
-  async next(): Promise<Picture | null> {
+  /** The next image; null where there is none any more. */
+  async next(): Promise<GreyImage | null> {
     if (!this.reader) return this.drawn(this.video, this.video.videoWidth, this.video.videoHeight);
     if (!this.newest) await new Promise<void>((came) => {
       this.waiting = came;
@@ -87,7 +87,7 @@ export class Camera {
   }
 
   /** The Y plane, bit for bit; null where the frame has none. */
-  private async luma(frame: VideoFrame): Promise<Picture | null> {
+  private async luma(frame: VideoFrame): Promise<GreyImage | null> {
     const rect = frame.visibleRect;
     if (!rect || !/^(I420|I422|I444|NV12|NV21)/.test(frame.format ?? '') || /P1[02]$/.test(frame.format ?? '')) return null;
     const bytes = new Uint8Array(frame.allocationSize()), [plane] = await frame.copyTo(bytes);
@@ -102,7 +102,7 @@ export class Camera {
   }
 
   /** As a canvas draws it: its colours have been converted, and are off by some grey values. */
-  private drawn(source: CanvasImageSource, width: number, height: number): Picture | null {
+  private drawn(source: CanvasImageSource, width: number, height: number): GreyImage | null {
     this.isExact = false;
     if (!(width > 0 && height > 0)) return null;
     this.canvas.width = width;

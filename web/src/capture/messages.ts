@@ -1,5 +1,5 @@
 // What the run says of the capture, and what it is sent.
-import type {Picture} from './camera';
+import type {GreyImage} from './camera';
 
 export interface Look {
   op: 'look';
@@ -30,29 +30,29 @@ export interface State {
   sentence?: string; // of shots: the verdict on them
   history?: (number | null)[]; // of shots: 3σ of the origin after each, mm
 }
-export type Told = Look | State | {op: 'control'; yes: boolean} | {op: 'took'; file: string} | {op: 'note'; words: string} | {op: 'goal'; holds: boolean} | {op: 'ended'; exit_code: number; report: boolean};
+export type Message = Look | State | {op: 'control'; yes: boolean} | {op: 'took'; file: string} | {op: 'note'; words: string} | {op: 'goal'; holds: boolean} | {op: 'ended'; exit_code: number; report: boolean};
 
 const magic = 0x31594441; // 'ADY1'
 
-export function packed(picture: Picture): ArrayBuffer {
-  const message = new Uint8Array(16 + picture.grey.length), head = new DataView(message.buffer);
-  [magic, picture.width, picture.height, picture.isExact ? 1 : 0].forEach((value, i) => head.setUint32(4 * i, value, true));
-  message.set(picture.grey, 16);
+export function packed(image: GreyImage): ArrayBuffer {
+  const message = new Uint8Array(16 + image.grey.length), head = new DataView(message.buffer);
+  [magic, image.width, image.height, image.isExact ? 1 : 0].forEach((value, i) => head.setUint32(4 * i, value, true));
+  message.set(image.grey, 16);
   return message.buffer;
 }
 
 export interface Line {
   ask(op: string, value?: number): void;
-  send(picture: Picture): void;
+  send(image: GreyImage): void;
   close(): void;
 }
-export function connect(told: (message: Told) => void, shown: (jpeg: Blob) => void, lost: () => void): Line {
+export function connect(received: (message: Message) => void, shown: (jpeg: Blob) => void, lost: () => void): Line {
   const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/capture${location.search}`);
   let isOver = false;
   socket.binaryType = 'blob';
   socket.onmessage = (event: MessageEvent<string | Blob>) => {
     if (isOver) return;
-    if (typeof event.data === 'string') told(JSON.parse(event.data) as Told);
+    if (typeof event.data === 'string') received(JSON.parse(event.data) as Message);
     else shown(event.data);
   };
   socket.onclose = () => {
@@ -61,7 +61,7 @@ export function connect(told: (message: Told) => void, shown: (jpeg: Blob) => vo
   };
   return {
     ask: (op, value) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(value === undefined ? {op} : {op, value})),
-    send: (picture) => socket.readyState === WebSocket.OPEN && socket.send(packed(picture)),
+    send: (image) => socket.readyState === WebSocket.OPEN && socket.send(packed(image)),
     close: () => {
       isOver = true;
       socket.close();

@@ -1,14 +1,14 @@
-// The page of a capture: the camera's picture, where to hold the board, what is gained; it becomes the report.
+// The page of a capture: the camera's image, where to hold the board, what is gained; it becomes the report.
 import {Chart, charts, type Pen} from '../core/chart';
 import {cividis, css, onto, pixelShare} from '../core/colours';
 import {readDocument, type Doc} from '../core/document';
 import {button, el} from '../core/dom';
 import {num} from '../core/format';
-import {findPictures} from '../core/images';
+import {findImages} from '../core/images';
 import {redrawAll, showHelp, toggleTheme, type KeyHelp} from '../page/keys';
 import {Camera} from './camera';
-import {connect, type Line, type Look, type State, type Told} from './messages';
-import {CameraView} from './picture';
+import {connect, type Line, type Look, type Message, type State} from './messages';
+import {CameraView} from './view';
 
 export type Stage = 'asking' | 'refused' | 'looking' | 'paused' | 'watching' | 'goal' | 'ended' | 'lost';
 const looks: Record<Stage, [string, string, string]> = {
@@ -16,8 +16,8 @@ const looks: Record<Stage, [string, string, string]> = {
   looking: ['●', 'looking', 'good'], paused: ['◆', 'paused', 'care'], watching: ['○', 'watching: another page is in control', 'unknown'],
   goal: ['●', 'the goal is reached: calibrating', 'good'], ended: ['●', 'ended', 'good'], lost: ['✕', 'stopped', 'bad'],
 };
-const least_ms = 70; // between two pictures: the page and the solver share a machine
-const mostNotes = 4;
+const min_interval_ms = 70; // between two images: the page and the solver share a machine
+const maxNotes = 4;
 
 const boardKeys: KeyHelp = [['space', 'take the image as it is'], ['u', 'undo: forget the last photo'], ['p', 'pause: nothing is taken automatically; again: go on']];
 const shotKeys: KeyHelp = [['space', 'to the field of the reading'], ['Enter', 'in that field: take the image with the reading'], ['u', 'undo: forget the last shot']];
@@ -139,7 +139,7 @@ class CapturePage {
   private note(words: string, level = 'info'): void {
     if (this.notes.lastElementChild?.textContent === words) return;
     this.notes.append(el('li', {class: level}, words));
-    while (this.notes.childElementCount > mostNotes) this.notes.firstElementChild!.remove();
+    while (this.notes.childElementCount > maxNotes) this.notes.firstElementChild!.remove();
   }
   private lose(words: string): void {
     if (this.isOver) return;
@@ -164,11 +164,11 @@ class CapturePage {
     this.advise(words);
   }
 
-  private hear(message: Told): void {
+  private hear(message: Message): void {
     if (message.op === 'control') return void this.control(message.yes);
     if (message.op === 'state') return this.takeState(message);
     if (message.op === 'look') return this.takeLook(message);
-    if (message.op === 'took') return this.celebrate(message.file);
+    if (message.op === 'took') return this.isDone() ? undefined : this.celebrate(message.file); // an answer that was on its way
     if (message.op === 'note') return this.note(message.words);
     if (message.op === 'goal') {
       if (message.holds) this.set('goal');
@@ -204,22 +204,22 @@ class CapturePage {
     }
     this.isOpening = false;
   }
-  /** One picture after the other: the next when this one has been looked at. */
+  /** One image after the other: the next when this one has been looked at. */
   private async pump(): Promise<void> {
     for (let isFirst = true; this.camera && !this.isOver; isFirst = false) {
-      const begun = performance.now(), picture = await this.camera.next();
+      const begun = performance.now(), image = await this.camera.next();
       if (!this.camera || this.isOver) return;
-      if (!picture) {
+      if (!image) {
         await new Promise((later) => setTimeout(later, 50));
         continue;
       }
       const wasExact = this.root.dataset['exact'];
-      this.root.dataset['exact'] = picture.isExact ? '1' : '0';
-      if (!picture.isExact && (isFirst || wasExact === '1')) this.note('this browser gives no exact images: they come by a canvas, some grey values off, and the result says so');
+      this.root.dataset['exact'] = image.isExact ? '1' : '0';
+      if (!image.isExact && (isFirst || wasExact === '1')) this.note('this browser gives no exact images: they come by a canvas, some grey values off, and the result says so');
       const answer = new Promise<void>((come) => (this.answered = come));
-      this.line.send(picture);
+      this.line.send(image);
       await answer;
-      await new Promise((later) => setTimeout(later, Math.max(0, least_ms - (performance.now() - begun))));
+      await new Promise((later) => setTimeout(later, Math.max(0, min_interval_ms - (performance.now() - begun))));
     }
   }
 
@@ -356,7 +356,7 @@ class CapturePage {
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawAll, {signal: this.stop.signal});
   }
 
-  /** The same page becomes the report, with the pictures that the report has. */
+  /** The same page becomes the report, with the images that the report has. */
   private async end(hasReport: boolean): Promise<void> {
     this.isOver = true;
     this.finishCamera();
@@ -378,7 +378,7 @@ class CapturePage {
     void this.sound?.close();
     charts.clear();
     this.host.replaceChildren();
-    findPictures();
+    findImages();
     this.ended(readDocument(json));
     this.root.dataset['capture'] = 'ended';
   }

@@ -118,9 +118,9 @@ export class Pen {
     this.g.restore();
   }
   /** A bar of so many units with words, as on a map. */
-  scaleBar(x: number, y: number, length: number, words: string, isOnPicture = false): void {
-    const colour = isOnPicture ? '#fff' : this.c.ink;
-    if (isOnPicture) this.rect(x - 8, y - 12, length + this.width(words, 11.5) + 22, 24, 'rgba(20,24,29,.78)');
+  scaleBar(x: number, y: number, length: number, words: string, isOnImage = false): void {
+    const colour = isOnImage ? '#fff' : this.c.ink;
+    if (isOnImage) this.rect(x - 8, y - 12, length + this.width(words, 11.5) + 22, 24, 'rgba(20,24,29,.78)');
     this.line(x, y, x + length, y, colour, 2);
     this.line(x, y - 4, x, y + 4, colour, 1.5);
     this.line(x + length, y - 4, x + length, y + 4, colour, 1.5);

@@ -32,7 +32,7 @@ export interface Quantity {
   text: string;
 }
 
-const mostLeaves = 400; // more than that is a table, and stands in `data`
+const maxLeaves = 400; // more than that is a table, and stands in `data`
 
 function isObject(value: Json): value is Record<string, Json> {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
@@ -98,7 +98,7 @@ export class Table {
     return typeof value === 'object' ? textOf(value) : (value as Cell);
   }
   /** Whether the column has a finite number. */
-  tells(column: string): boolean {
+  hasValues(column: string): boolean {
     return this.has(column) && this.numbers(column).some(Number.isFinite);
   }
 }
@@ -213,7 +213,7 @@ export class Doc {
 
   // `sigmas` and `models` walk along with `value`: σ has the same path.
   private flatten(path: string, value: Json, sigmas: Json, models: Json): void {
-    if (this.estimates.length >= mostLeaves) return;
+    if (this.estimates.length >= maxLeaves) return;
     if (isObject(value)) {
       for (const [name, child] of Object.entries(value))
         this.flatten(path === '' ? name : `${path}.${name}`, child, member(sigmas, name), member(models, name));
@@ -258,7 +258,7 @@ export class Doc {
     return this.state === 'good' || this.state === 'care' || this.state === 'bad';
   }
   /** Size of the image in pixels; null if the document does not tell. */
-  get pictureSize(): {width: number; height: number} | null {
+  get imageSize(): {width: number; height: number} | null {
     const width = this.estimate('camera.width'), height = this.estimate('camera.height');
     return width >= 1 && height >= 1 && width < 1e5 && height < 1e5 ? {width, height} : null;
   }

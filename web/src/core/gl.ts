@@ -1,5 +1,5 @@
 // One WebGL renderer for all 3-D figures. It draws out of sight; the figure's canvas takes the image, so that paper and
-// saved pictures need nothing of their own.
+// saved images need nothing of their own.
 import {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, Mesh, MeshBasicMaterial, PerspectiveCamera, Points,
   PointsMaterial, Scene, SRGBColorSpace, WebGLRenderer,
@@ -78,7 +78,7 @@ function disc(): CanvasTexture {
   return (discTexture = new CanvasTexture(canvas));
 }
 
-function pictureMesh(corners: [V3, V3, V3, V3], image: HTMLImageElement): Mesh {
+function imageMesh(corners: [V3, V3, V3, V3], image: HTMLImageElement): Mesh {
   const geometry = new BufferGeometry();
   const [a, b, c, d] = corners;
   geometry.setAttribute('position', new BufferAttribute(new Float32Array([...a, ...b, ...c, ...a, ...c, ...d]), 3));
@@ -113,9 +113,9 @@ export function sceneOf(world: World, images: (name: string) => HTMLImageElement
     scene.add(new LineSegments2(new LineSegmentsGeometry().setPositions(places), material));
   }
   for (const [size, dots] of grouped(world.dots, (dot) => dot.size)) scene.add(dotsCloud(dots, size, ratio));
-  for (const picture of world.pictures) {
-    const image = images(picture.name);
-    if (image) scene.add(pictureMesh(picture.corners, image));
+  for (const texture of world.textures) {
+    const image = images(texture.name);
+    if (image) scene.add(imageMesh(texture.corners, image));
   }
   return scene;
 }

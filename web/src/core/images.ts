@@ -1,4 +1,4 @@
-// Pictures stand in the page as inert blocks; one becomes an image when it is first looked at.
+// Images stand in the page as inert blocks; one becomes an image when it is first looked at.
 
 const blocks = new Map<string, HTMLElement>();
 const images = new Map<string, HTMLImageElement>();
@@ -7,20 +7,20 @@ const arrived: (() => void)[] = [];
 let isComplete = false;
 
 /** The blocks stand behind the script: they are found once the page has been read. */
-export function findPictures(): void {
+export function findImages(): void {
   for (const block of document.querySelectorAll<HTMLElement>('script[type="text/plain"][id^="image-"]'))
     blocks.set(block.dataset['name'] ?? '', block);
   isComplete = true;
   for (const listener of arrived.splice(0)) listener();
 }
-export function whenPicturesAreHere(listener: () => void): void {
+export function whenImagesAreHere(listener: () => void): void {
   if (isComplete) listener();
   else arrived.push(listener);
 }
-export function hasPicture(name: string): boolean {
+export function hasImage(name: string): boolean {
   return blocks.has(name);
 }
-export function pictureNames(): string[] {
+export function imageNames(): string[] {
   return [...blocks.keys()];
 }
 

@@ -59,7 +59,7 @@ export function lensOf(doc: Doc, path = 'camera'): Lens | null {
   if (!(fx > 0 && fy > 0) || !Number.isFinite(cx) || !Number.isFinite(cy)) return null;
   const isFisheye = doc.estimateText(`${path}.model`) === 'kannala_brandt';
   const k = ['k1', 'k2', 'k3', 'k4'].map(or0), p1 = or0('p1'), p2 = or0('p2');
-  const size = doc.pictureSize ?? {width: 2 * cx, height: 2 * cy};
+  const size = doc.imageSize ?? {width: 2 * cx, height: 2 * cy};
   const project = (p: V3): [number, number] | null => {
     if (!(p[2] > 1e-9)) return null;
     const x = p[0] / p[2], y = p[1] / p[2], r2 = x * x + y * y;

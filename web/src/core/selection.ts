@@ -27,7 +27,7 @@ export class Selection {
   choose(item: number): void {
     if (item === this.chosen) return;
     this.chosen = item;
-    this.tell();
+    this.notify();
   }
   step(by: number): void {
     if (this.order.length === 0) return;
@@ -37,12 +37,12 @@ export class Selection {
   at(time: number): void {
     if (time === this.instant) return;
     this.instant = time;
-    this.tell();
+    this.notify();
   }
   on(listener: Listener): void {
     this.listeners.push(listener);
   }
-  private tell(): void {
+  private notify(): void {
     for (const listener of this.listeners) listener();
   }
 }

@@ -72,7 +72,7 @@ export function bandAboutZero(sigma: Values, colour: ColourName): Band {
 }
 
 export const seriesPlots = new Set<SeriesPlot>();
-export const mostMarks = 16; // events in sight, each a line through the plot
+export const maxMarks = 16; // events in sight, each a line through the plot
 const font = '11px system-ui, "DejaVu Sans", sans-serif';
 
 export class SeriesPlot {
@@ -88,7 +88,7 @@ export class SeriesPlot {
     const head = el('p', {class: 'series-head'}, el('b', {}, look.label), this.aside);
     host.append(el('div', {class: look.isFilling ? 'series-outer filling' : 'series-outer', role: 'img', 'aria-label': look.aria}, head, this.box));
     this.plot = new uPlot(this.options(), this.data(), this.box);
-    this.plot.over.addEventListener('mousemove', (event) => this.tell(event));
+    this.plot.over.addEventListener('mousemove', (event) => this.showTip(event));
     this.plot.over.addEventListener('mouseleave', () => hideTip());
     this.plot.over.addEventListener('click', () => {
       const index = this.plot.cursor.idx;
@@ -183,7 +183,7 @@ export class SeriesPlot {
   /** Many events stand in a lane of their own above the plot, as ticks: lines through it would hide what it shows. */
   private hasLane(u: uPlot): boolean {
     const {min, max} = u.scales['x']!, events = this.look.events ?? [];
-    return events.length > mostMarks && events.filter((one) => one.t >= min! && one.t <= max!).length > mostMarks;
+    return events.length > maxMarks && events.filter((one) => one.t >= min! && one.t <= max!).length > maxMarks;
   }
   private drawBand(u: uPlot, band: Band): void {
     const t = this.look.t, g = u.ctx;
@@ -243,7 +243,7 @@ export class SeriesPlot {
     const time = this.look.selection?.time ?? NaN, x = u.valToPos(time, 'x', true);
     if (x >= left && x <= left + width) stroke(g, [x, top, x, top + height], c.red, 1.4 * ratio, []);
   }
-  private tell(event: MouseEvent): void {
+  private showTip(event: MouseEvent): void {
     const index = this.plot.cursor.idx;
     if (index === null || index === undefined) return;
     const look = this.look, lines = look.tip ? look.tip(index) : look.lines.filter((line) => !line.isQuiet)

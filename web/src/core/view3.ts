@@ -4,7 +4,7 @@ import {Chart, type ChartLook, type Pen} from './chart';
 import {num} from './format';
 import {cssOf, dispose, glRenderer, Orbit, sceneOf} from './gl';
 import {drawFlat} from './flat';
-import {imageOf, whenPicturesAreHere} from './images';
+import {imageOf, whenImagesAreHere} from './images';
 import type {V3} from './rigid';
 import {roundDown125} from './stats';
 import {ballOf, World, type Touch} from './world';
@@ -47,8 +47,8 @@ export class View3 {
     this.chart.box.classList.add('view3');
     new IntersectionObserver((entries) => {
       if (!entries.some((entry) => entry.isIntersecting) || this.isNear) return;
-      // Behind what is read first, which has been painted by then, and once for all: pictures may lie in it.
-      whenPicturesAreHere(() => requestAnimationFrame(() => setTimeout(() => this.wake(), 150)));
+      // Behind what is read first, which has been painted by then, and once for all: images may lie in it.
+      whenImagesAreHere(() => requestAnimationFrame(() => setTimeout(() => this.wake(), 150)));
     }, {rootMargin: '300px'}).observe(this.chart.box);
     if (!this.isFlat) this.listen();
     views3.add(this);
@@ -56,7 +56,7 @@ export class View3 {
   private home(): Orbit {
     return new Orbit(this.look.up, this.look.ahead, this.look.yaw, this.look.pitch);
   }
-  /** Draws even where it is far from the window: for paper and saved pictures. */
+  /** Draws even where it is far from the window: for paper and saved images. */
   wake(): void {
     if (this.isNear) return;
     this.isNear = true;

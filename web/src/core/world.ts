@@ -34,7 +34,7 @@ export interface Label {
   text: string;
   colour: Colour;
 }
-export interface Picture {
+export interface Texture {
   corners: [V3, V3, V3, V3]; // as the image's: top left, top right, bottom right, bottom left
   name: string;
 }
@@ -44,7 +44,7 @@ export class World {
   readonly faces: Face[] = [];
   readonly dots: Dot[] = [];
   readonly labels: Label[] = [];
-  readonly pictures: Picture[] = [];
+  readonly textures: Texture[] = [];
   /** Points that a first look must hold. */
   readonly frame: V3[] = [];
   marks = 0;

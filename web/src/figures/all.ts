@@ -26,7 +26,7 @@ import {observePoints, observeTracks} from './observe_points';
 import {photo} from './photo';
 import {planCalibrate, planEstimate, planObserve, planRangefinder, planSketches} from './plan';
 import {poses} from './poses';
-import {projectHeads, projectPicture} from './project';
+import {projectHeads, projectImage} from './project';
 import {rangefinderBeam} from './rangefinder_beam';
 import {rangefinderPhoto, rangefinderShots} from './rangefinder_photo';
 import {rangefinderCounts, rangefinderNext, rangefinderPrecision} from './rangefinder_precision';
@@ -36,7 +36,7 @@ import {reproduceFigure, reproduceMethods, reproduceShort, reproduceTable} from 
 import {residuals} from './residuals';
 import {rigCoverage, rigEstimate, rigResiduals, rigSpace, rigUnknown, rigView} from './rig';
 import {movingAbove, movingClocks, movingEstimate, movingSpace} from './rig_moving';
-import {servoAngles, servoCompare, servoError, servoFocal, servoLenses, servoLoops, servoPicture, servoRobust} from './servo';
+import {servoAngles, servoCompare, servoError, servoFocal, servoLenses, servoLoops, servoImage, servoRobust} from './servo';
 import {batchSpread} from './batch';
 import {studyCurve} from './study';
 import {batchLot, batchOutliers, batchRows, studyQuantities, studyWorst} from './tables';
@@ -66,13 +66,13 @@ const byCommand: Record<string, Page> = {
   rangefinder: {first: [even({...values, note: 'camera frame, value ± 3σ'}), even(wide(rangefinderBeam))], rest: [clusters, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots, ...grounds]},
   rig: {first: [{...rigEstimate, span: 11, narrow: 24}, {...rigSpace, span: 13, narrow: 24}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks, causes]},
   track: {first: [values, wide(trackSpace)], rest: [trackPosition, trackError, trackInnovations, {...trackAbove, span: 12}, {...trackAge, span: 12}, ...grounds]},
-  servo: {first: [{...servoCompare, span: 10}, servoError], rest: [servoLenses, servoFocal, servoAngles, servoPicture, half(servoRobust), half(servoLoops), trackSpace, trackPosition, assumed, checks]},
+  servo: {first: [{...servoCompare, span: 10}, servoError], rest: [servoLenses, servoFocal, servoAngles, servoImage, half(servoRobust), half(servoLoops), trackSpace, trackPosition, assumed, checks]},
   localize: {first: [values, wide(localizeSpace)], rest: [half(localizeError), localizeFrame, half(localizeTracks), half(localizeNis), half(localizeSpeed), ...grounds]},
   identify: {first: [values, identifyResponse], rest: [identifySpread, clusters, ...grounds]},
   'plan calibrate': {first: [planEstimate, planCalibrate], rest: [planSketches, assumed, checks]},
   'plan observe': {first: [planEstimate, planObserve], rest: [assumed, checks]},
   'plan rangefinder': {first: [planEstimate, planRangefinder], rest: [planSketches, assumed, checks]},
-  project: {first: [{...values, isOptional: true}, projectPicture], rest: [projectHeads, assumed, checks]},
+  project: {first: [{...values, isOptional: true}, projectImage], rest: [projectHeads, assumed, checks]},
   'camera diff': {first: [{...parameters, span: 10, narrow: 24}, {...difference, span: 14, narrow: 24}], rest: [half(diagonal), half(estimate), assumed, checks]},
 };
 const following: Page = {first: [values, wide(followError)], rest: [followAngles, assumed, checks]};

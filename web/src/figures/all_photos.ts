@@ -2,13 +2,13 @@
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
 import {num} from '../core/format';
-import {hasPicture, imageOf, whenPicturesAreHere} from '../core/images';
+import {hasImage, imageOf, whenImagesAreHere} from '../core/images';
 import type {Selection} from '../core/selection';
 import {calibrateScene} from './calibrate_scene';
 
-const mostThumbs = 1000;
+const maxThumbs = 1000;
 
-/** Thumbnails that choose; each picture is decoded when it comes into sight. */
+/** Thumbnails that choose; each image is decoded when it comes into sight. */
 export function thumbnails(host: HTMLElement, selection: Selection, items: number[], words: (item: number) => string, name: (item: number) => string): number {
   const box = el('div', {class: 'thumbs', role: 'group', 'aria-label': 'choose'}), buttons = new Map<number, HTMLButtonElement>();
   const observer = new IntersectionObserver((entries) => {
@@ -23,7 +23,7 @@ export function thumbnails(host: HTMLElement, selection: Selection, items: numbe
       show();
     }
   }, {rootMargin: '200px'});
-  for (const item of items.slice(0, mostThumbs)) {
+  for (const item of items.slice(0, maxThumbs)) {
     const button = el('button', {type: 'button', title: words(item), 'data-item': item}, el('span', {class: 'empty'}), el('span', {}, words(item)));
     button.addEventListener('click', () => selection.choose(item));
     buttons.set(item, button);
@@ -33,8 +33,8 @@ export function thumbnails(host: HTMLElement, selection: Selection, items: numbe
   selection.on(mark);
   mark();
   host.append(box);
-  whenPicturesAreHere(() => {
-    const has = items.some((item) => hasPicture(name(item)));
+  whenImagesAreHere(() => {
+    const has = items.some((item) => hasImage(name(item)));
     for (const button of buttons.values()) has ? observer.observe(button) : button.firstElementChild?.remove();
   });
   return buttons.size;
@@ -49,6 +49,6 @@ export const allPhotos: Figure = {
       const photo = scene.photos[i]!;
       return `${photo.name} · ${photo.isUsed ? `${num(photo.rms_px, 3)} px` : 'not used'}`;
     }, (i) => scene.photos[i]!.name);
-    return {marks, rows: Math.min(mostThumbs, order.length), tables: [doc.table('photos')!], words: `${marks} photos`};
+    return {marks, rows: Math.min(maxThumbs, order.length), tables: [doc.table('photos')!], words: `${marks} photos`};
   },
 };

@@ -29,7 +29,7 @@ export const batchSpread: Figure = {
   id: 'spread', title: 'Which are outliers of the lot?', note: 'distance from the lot’s median, over its scatter and the value’s own σ', span: 24,
   draw(host, doc) {
     const table = doc.table('values');
-    if (!table || !table.tells('z')) return null;
+    if (!table || !table.hasValues('z')) return null;
     const most = 14, all = byQuantity(table), rows = all.slice(0, most), z = table.numbers('z'), out = z.filter((v) => Math.abs(v) > standsOut).length;
     const reach = placed(Math.max(8, ...z.map(Math.abs))) + 0.5;
     const dot = (pen: Pen, i: number, x: number, y: number) => {

@@ -42,7 +42,7 @@ export const board: Figure = {
   id: 'board', title: 'Is the board flat?', note: 'mm', span: 8,
   draw(host, doc) {
     const points = doc.table('board_points');
-    if (!points || !points.tells('dz_m')) return null;
+    if (!points || !points.hasValues('dz_m')) return null;
     const highest_mm = 1e3 * largestSize(points.numbers('dz_m')), isFlat = !(highest_mm > 0) && !(largestSize(points.numbers('dx_m')) > 0);
     const cols = largestSize(points.numbers('col')) || 1, rows = largestSize(points.numbers('row')) || 1;
     if (isFlat) host.append(el('p', {class: 'caption'}, 'The board was fixed flat, so its heights are not shown.'));

@@ -46,7 +46,7 @@ function read(doc: Doc): Scene {
   for (let i = 0; corners && i < corners.count; ++i) photos[corners.photo[i]!]?.corners.push(i);
   const all = photos.map((_, i) => i), rms = (i: number) => photos[i]!.rms_px;
   const cols = doc.estimate('board.cols'), rows = doc.estimate('board.rows'), square_m = doc.estimate('board.square_m');
-  return {size: doc.pictureSize, photos, corners,
+  return {size: doc.imageSize, photos, corners,
     worstFirst: all.filter((i) => photos[i]!.isUsed && rms(i) >= 0).sort((a, b) => rms(b) - rms(a)),
     unused: all.filter((i) => !(photos[i]!.isUsed && rms(i) >= 0)),
     board: cols > 1 && rows > 1 && square_m > 0 && cols < 500 && rows < 500 ? {cols, rows, square_m} : null};

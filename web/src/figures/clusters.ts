@@ -12,7 +12,7 @@ const words: Record<string, [string, string]> = {photos: ['photo', 'Photo by pho
 
 function tableOf(doc: Doc): Table | null {
   for (const name of [...Object.keys(words), ...doc.tables.keys()])
-    if (doc.table(name)?.tells('cluster_z2')) return doc.table(name);
+    if (doc.table(name)?.hasValues('cluster_z2')) return doc.table(name);
   return null;
 }
 

@@ -14,7 +14,7 @@ export function triple(table: Table, before: string, after = '_m'): Triple {
   return {value, at: (i) => [value[0]![i]!, value[1]![i]!, value[2]![i]!]};
 }
 export function hasTriple(table: Table, before: string, after = '_m'): boolean {
-  return axisNames.every((axis) => table.tells(`${before}${axis}${after}`));
+  return axisNames.every((axis) => table.hasValues(`${before}${axis}${after}`));
 }
 
 /** Row nearest to a time; −1 of none. */

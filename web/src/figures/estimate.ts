@@ -15,7 +15,7 @@ interface Reading {
 
 const lensPixels = new Set(['fx', 'fy', 'cx', 'cy', 'skew', 'width', 'height']);
 
-const mostAtOnce = 13; // rows; the others are a click away
+const maxAtOnce = 13; // rows; the others are a click away
 
 /** Units are in the names (`origin_m`, `rms_px`), except of a lens, whose parameters have the names of its literature. */
 function readingOf(quantity: Quantity, doc: Doc): Reading {
@@ -71,7 +71,7 @@ function rowOf(quantity: Quantity, doc: Doc, has: Columns): HTMLElement {
 }
 
 function lensLine(doc: Doc): string {
-  const size = doc.pictureSize, model = doc.estimateText('camera.model');
+  const size = doc.imageSize, model = doc.estimateText('camera.model');
   return size && model ? `${model} lens, ${size.width} × ${size.height} px` : '';
 }
 
@@ -122,9 +122,9 @@ export const estimate: Figure = {
     host.append(el('table', {class: 'estimate'},
       has.model || has.bound || has.error ? el('thead', {}, el('tr', {}, el('th'), el('th'), el('th', {}, '3σ'), has.model ? el('th', {}, 'over model') : null, has.bound ? el('th', {}, 'at best') : null,
         has.error ? el('th', {}, 'error') : null, el('th'))) : null,
-      el('tbody', {}, ...rows.slice(0, mostAtOnce))));
-    if (rows.length > mostAtOnce)
-      host.append(el('details', {class: 'reasons'}, el('summary', {}, `${rows.length - mostAtOnce} more`), el('table', {class: 'estimate'}, el('tbody', {}, ...rows.slice(mostAtOnce)))));
+      el('tbody', {}, ...rows.slice(0, maxAtOnce))));
+    if (rows.length > maxAtOnce)
+      host.append(el('details', {class: 'reasons'}, el('summary', {}, `${rows.length - maxAtOnce} more`), el('table', {class: 'estimate'}, el('tbody', {}, ...rows.slice(maxAtOnce)))));
     return {marks: shown.length, rows: shown.length, tables: [], words: '',
       good: !doc.isAnswer ? 'No answer: values are where the search ended, and not to be used.' : has.bound ? atBest(doc) : has.model ? 'Over model: how many times σ is above what it would be if every measurement erred by itself.' : undefined};
   },

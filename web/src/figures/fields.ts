@@ -3,7 +3,7 @@ import {Chart} from '../core/chart';
 import type {Grid} from '../core/document';
 import {el} from '../core/dom';
 import {num} from '../core/format';
-import {colourBar, drawArrows, drawContours, drawHeat, magnificationFor, panelIn, valueAt, type Panel} from '../core/picture';
+import {colourBar, drawArrows, drawContours, drawHeat, magnificationFor, panelIn, valueAt, type Panel} from '../core/panel';
 import {quantile} from '../core/stats';
 
 export interface Field {

@@ -14,7 +14,7 @@ export const followError: Figure = {
   id: 'error', title: 'How far off was the target?', note: 'px, from the principal point', span: 16,
   draw(host, doc: Doc, selection) {
     const table = doc.table('follow');
-    if (!table || !table.tells('error_u_px')) return null;
+    if (!table || !table.hasValues('error_u_px')) return null;
     const {t, column} = columns(table), u = column('error_u_px'), v = column('error_v_px'), off = u.map((x, i) => Math.hypot(x, v[i]!)), found = off.filter(Number.isFinite);
     const rms = doc.estimate('rms_px'), predicted = doc.estimate('forecast.rms_px'), levels: Level[] = [];
     if (rms > 0) levels.push({value: rms, colour: 'blue'});
@@ -31,7 +31,7 @@ export const followAngles: Figure = {
   id: 'angles', title: 'Did the head follow?', note: '°', span: 24,
   draw(host, doc: Doc, selection) {
     const table = doc.table('follow');
-    if (!table || !table.tells('measured_pan_rad')) return null;
+    if (!table || !table.hasValues('measured_pan_rad')) return null;
     const {t, column} = columns(table), angle = (name: string) => scaled(column(name), degrees);
     legend(host, [{words: 'asked', colour: 'var(--ink)', look: 'dash'}, {words: 'reached', colour: 'var(--blue)'}, {words: 'the target', colour: 'var(--orange)'}]);
     for (const axis of ['pan', 'tilt'] as const) {

@@ -10,7 +10,7 @@ export const halves: Figure = {
   draw(host, doc) {
     const grid = doc.pixelGrid('halves'), du = grid?.values('delta_u_px'), dv = grid?.values('delta_v_px');
     if (!grid || !du || !dv) return null;
-    const size = doc.pictureSize ?? sizeOfGrid(grid), values = lengths(du, dv), sigma = grid.values('predicted_sigma_px');
+    const size = doc.imageSize ?? sizeOfGrid(grid), values = lengths(du, dv), sigma = grid.values('predicted_sigma_px');
     const row = el('div', {class: 'row'}), left = el('div'), right = el('div');
     host.append(row);
     row.append(left);

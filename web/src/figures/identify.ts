@@ -9,7 +9,7 @@ export const identifyResponse: Figure = {
   id: 'response', title: 'Does the model follow the axis?', note: 'command in its own unit, angle and residual in °, each on its own axis', span: 16,
   draw(host, doc, selection) {
     const table = doc.table('response');
-    if (!table || !table.tells('measured_rad')) return null;
+    if (!table || !table.hasValues('measured_rad')) return null;
     const t = table.numbers('t_s'), measured = scaled(table.numbers('measured_rad'), degrees), model = scaled(table.numbers('model_rad'), degrees), residual = scaled(table.numbers('residual_rad'), degrees);
     const command = table.numbers('command'), hasModel = model.some(Number.isFinite), reach = 1.1 * Math.max(quantile(residual.map(Math.abs), 0.998), 1e-9);
     legend(host, [{words: 'command', colour: 'var(--green)'}, {words: 'measured', colour: 'var(--blue)', look: 'dot'}, ...(hasModel ? [{words: 'modelled', colour: 'var(--orange)'}] : [])]);
@@ -29,7 +29,7 @@ export const identifySpread: Figure = {
   id: 'spread', isOptional: true, title: 'Does the residual follow the angle?', note: 'modelled − measured, °', span: 12,
   draw(host, doc, selection) {
     const table = doc.table('response');
-    if (!table || !table.tells('residual_rad') || !table.tells('model_rad')) return null;
+    if (!table || !table.hasValues('residual_rad') || !table.hasValues('model_rad')) return null;
     const model = scaled(table.numbers('model_rad'), degrees), residual = scaled(table.numbers('residual_rad'), degrees), t = table.numbers('t_s');
     const every = Math.max(1, Math.floor(table.rows / 3000)), rows = Array.from(model.keys()).filter((i) => i % every === 0 && Number.isFinite(model[i]! + residual[i]!));
     scatter(host, rows.map((i) => ({x: model[i]!, y: residual[i]!, size: 1.8, colour: (pen) => pen.c.blue, pick: () => selection.at(t[i]!), tip: () => [`${num(t[i]!, 5)} s`, `modelled ${num(model[i]!, 4)}°, off by ${num(residual[i]!, 3)}°`]})),

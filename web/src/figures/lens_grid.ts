@@ -2,7 +2,7 @@
 import {Chart, type Pen} from '../core/chart';
 import {legend, type Figure} from '../core/figure';
 import {num} from '../core/format';
-import {panelIn} from '../core/picture';
+import {panelIn} from '../core/panel';
 import {lensOf, type Lens} from '../core/rigid';
 
 const lines = 13, steps = 80;
@@ -31,7 +31,7 @@ export const lensGrid: Figure = {
   id: 'grid', isOptional: true, title: 'What does this lens do?', note: 'straight lines of the world, in the image', span: 16,
   draw(host, doc) {
     const lens = lensOf(doc), model = doc.estimateText('camera.model');
-    if (!lens || !doc.pictureSize || !/^(pinhole|brown|kannala_brandt)$/.test(model)) return null; // a port has no rays through one point
+    if (!lens || !doc.imageSize || !/^(pinhole|brown|kannala_brandt)$/.test(model)) return null; // a port has no rays through one point
     legend(host, [{words: 'as the lens shows them', colour: 'var(--blue)'}, {words: 'without distortion', colour: 'var(--soft)', look: 'dash'}, {words: 'principal point', colour: 'var(--orange)'}]);
     new Chart(host, {height: 160, aspect: lens.height / lens.width, most: 440, label: `Straight lines through a ${model} lens`}, (pen) => drawLines(pen, lens));
     return {marks: 2 * lines, rows: 2 * lines, tables: [], words: `a ${model} lens`, good: 'Where a blue line ends inside the image, the lens model folds back: nothing of the world is shown beyond.'};

@@ -101,11 +101,11 @@ export const localizeTracks: Figure = {
   id: 'tracks', title: 'Were points kept?', note: 'points a frame', span: 6,
   draw(host, doc, selection) {
     const path = doc.table('path');
-    if (!path || !path.tells('num_tracked')) return null;
+    if (!path || !path.hasValues('num_tracked')) return null;
     const t = path.numbers('t_s'), lost = Array.from({length: path.rows}, (_, i) => path.text('event', i)).map((event, i) => ({t: t[i]!, words: event})).filter((one) => /lost|restart/.test(one.words)).slice(0, 200);
     legend(host, [{words: 'used', colour: 'var(--blue)'}, {words: 'seen', colour: 'var(--soft)', look: 'dash'}, {words: 'gated', colour: 'var(--red)', look: 'dot'}]);
     new SeriesPlot(host, {t, selection, label: 'points', xLabel: 'time, s', height: 230, isFilling: true, aria: 'points kept over time', events: lost, lines: [{name: 'used', values: path.numbers('num_tracked'), colour: 'blue', isSteps: true},
-      ...(path.tells('num_seen') ? [{name: 'seen', values: path.numbers('num_seen'), colour: 'soft' as const, dash: [4, 3], isSteps: true}] : []), {name: 'gated', values: path.numbers('num_gated').map((v) => (v > 0 ? v : NaN)), colour: 'red', isDots: true, size: 5}]});
+      ...(path.hasValues('num_seen') ? [{name: 'seen', values: path.numbers('num_seen'), colour: 'soft' as const, dash: [4, 3], isSteps: true}] : []), {name: 'gated', values: path.numbers('num_gated').map((v) => (v > 0 ? v : NaN)), colour: 'red', isDots: true, size: 5}]});
     return {marks: path.rows, rows: path.rows, tables: [path], words: '', good: 'Good: enough points at all times (six and more), few gated.'};
   },
 };
@@ -114,7 +114,7 @@ export const localizeNis: Figure = {
   id: 'nis', title: 'Does each frame fit?', note: 'NIS', span: 6,
   draw(host, doc, selection) {
     const path = doc.table('path');
-    if (!path || !path.tells('nis')) return null;
+    if (!path || !path.hasValues('nis')) return null;
     const tracked = path.numbers('num_tracked'), nis = path.numbers('nis'), dof = (i: number) => Math.max(1, 2 * (tracked[i]! || 1));
     const share = drawNis(host, {t: path.numbers('t_s'), nis: nis.map((v, i) => v * dof(i)), dof, counts: () => true, label: 'NIS over its degrees of freedom: 1 is expected', xLabel: 'time, s', height: 250, selection, isFilling: true});
     const words = `${percent(share.inside, share.known, 1)} are inside (95 % expected)`;
@@ -126,7 +126,7 @@ export const localizeSpeed: Figure = {
   id: 'speed', title: 'Is it fast enough?', note: 'ms a frame', span: 6,
   draw(host, doc, selection) {
     const path = doc.table('path');
-    if (!path || !path.tells('seconds')) return null;
+    if (!path || !path.hasValues('seconds')) return null;
     const t = path.numbers('t_s'), ms = scaled(path.numbers('seconds'), 1e3), period = quantile(t.map((v, i) => (i > 0 ? 1e3 * (v - t[i - 1]!) : NaN)), 0.5);
     const late = ms.filter((v) => v > period).length, top = Math.max(quantile(ms, 1), period > 0 && period < 50 * quantile(ms, 1) ? period : 0);
     new SeriesPlot(host, {t, selection, label: 'time a frame, ms', xLabel: 'time, s', height: 230, isFilling: true, aria: 'time a frame', lines: [{name: 'ms', values: ms, colour: 'blue', isDots: true}], range: [0, 1.15 * top || 1],

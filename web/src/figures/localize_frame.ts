@@ -3,11 +3,11 @@ import {Chart} from '../core/chart';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
 import {num} from '../core/format';
-import {imageOf, whenPicturesAreHere} from '../core/images';
-import {ellipsePlaces, panelIn} from '../core/picture';
+import {imageOf, whenImagesAreHere} from '../core/images';
+import {ellipsePlaces, panelIn} from '../core/panel';
 import type {Selection} from '../core/selection';
 
-/** Of the pictures kept, the one nearest to the chosen instant. */
+/** Of the images kept, the one nearest to the chosen instant. */
 function nearest(t: Float64Array, selection: Selection): number {
   if (!Number.isFinite(selection.time)) return Math.floor(t.length / 2);
   let best = 0;
@@ -28,19 +28,19 @@ export const localizeFrame: Figure = {
     legend(host, [{words: 'expected, 3σ', colour: 'var(--sky)', look: 'ring'}, {words: 'found', colour: 'var(--orange)', look: 'dot'}, {words: 'gated', colour: 'var(--red)', look: 'dot'}]);
     const caption = el('p', {class: 'caption'}), size = {width: frames.number('width_px', 0) || 640, height: frames.number('height_px', 0) || 480};
     host.append(caption);
-    const inPicture = (k: number) => Array.from(of.keys()).filter((i) => of[i] === k);
+    const inImage = (k: number) => Array.from(of.keys()).filter((i) => of[i] === k);
     const chart = new Chart(host, {height: 220, aspect: size.height / size.width, most: 640}, (pen) => {
       const image = imageOf(frames.text('name', shown), () => chart.redraw()), panel = panelIn(size, 0, 0, pen.w, pen.h);
       if (image) pen.g.drawImage(image, panel.x, panel.y, panel.w, panel.h);
       else pen.rect(panel.x, panel.y, panel.w, panel.h, '#39424c');
       pen.clipped(panel.x, panel.y, panel.w, panel.h, () => {
-        for (const i of inPicture(shown)) {
+        for (const i of inImage(shown)) {
           const [x, y] = panel.at(eu[i]!, ev[i]!), ring = ellipsePlaces(x, y, uu[i]!, uv[i]!, vv[i]!, 3 * panel.perPixel);
           pen.path(ring, '#000', 3, [], true), pen.path(ring, '#56b4e9', 1.5, [], true);
           if (Number.isFinite(u[i]!)) pen.circle(...panel.at(u[i]!, v[i]!), 3, used[i]! > 0 ? '#e69f00' : '#d55e00', '#000', 1);
         }
       });
-      for (const i of inPicture(shown)) {
+      for (const i of inImage(shown)) {
         const [x, y] = panel.at(eu[i]!, ev[i]!);
         pen.hit({x, y, r: 5, tip: () => [`point ${sights.text('id', i)}`, `expected at ${num(eu[i]!, 4)}, ${num(ev[i]!, 4)} px ± ${num(3 * Math.sqrt(Math.max(uu[i]!, vv[i]!)), 2)} (3σ)`,
           Number.isFinite(u[i]!) ? `${used[i]! > 0 ? 'found' : 'found, and gated'} ${num(Math.hypot(u[i]! - eu[i]!, v[i]! - ev[i]!), 2)} px from there` : 'not found']});
@@ -55,12 +55,12 @@ export const localizeFrame: Figure = {
         item = shown = selection.item;
         selection.at(time = t[shown]!);
       }
-      const here = inPicture(shown), found = here.filter((i) => used[i]! > 0).length;
+      const here = inImage(shown), found = here.filter((i) => used[i]! > 0).length;
       caption.replaceChildren(el('b', {}, `${num(t[shown]!, 4)} s`), ` · ${found} of ${here.length} points found and used · image ${shown + 1} of ${t.length} kept`);
       chart.redraw();
     };
     selection.on(update);
-    whenPicturesAreHere(update);
+    whenImagesAreHere(update);
     update();
     return {marks: sights.rows, rows: sights.rows, tables: [frames, sights], words: caption.textContent ?? '', good: 'Good: most ellipses hold a dot, small ones near their centre. Large: the point is new, or the camera was not seen for a while.'};
   },

@@ -3,7 +3,7 @@ import {Chart, type Pen} from '../core/chart';
 import type {Doc, Table} from '../core/document';
 import type {Figure} from '../core/figure';
 import {degrees, num} from '../core/format';
-import {panelIn} from '../core/picture';
+import {panelIn} from '../core/panel';
 import {column, lensOf, move, norm, poseOf, type Lens, type Pose, type V3} from '../core/rigid';
 import {scale} from '../core/scale';
 import {largestSize} from '../core/stats';

@@ -17,7 +17,7 @@ interface Directions {
 }
 
 function outline(r: M3, doc: Doc): V3[] {
-  const size = doc.pictureSize, fx = doc.estimate('camera.fx'), fy = doc.estimate('camera.fy'), cx = doc.estimate('camera.cx'), cy = doc.estimate('camera.cy');
+  const size = doc.imageSize, fx = doc.estimate('camera.fx'), fy = doc.estimate('camera.fy'), cx = doc.estimate('camera.cx'), cy = doc.estimate('camera.cy');
   if (!size || !(fx > 0 && fy > 0)) return [];
   const places: V3[] = [], pieces = 8;
   for (const [u0, v0, u1, v1] of [[0, 0, 1, 0], [1, 0, 1, 1], [1, 1, 0, 1], [0, 1, 0, 0]] as const)

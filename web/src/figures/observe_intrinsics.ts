@@ -2,7 +2,7 @@
 import {el} from '../core/dom';
 import {legend, type Figure, type Key} from '../core/figure';
 import {num, percent, withSigma} from '../core/format';
-import {bandOf, mostMarks, SeriesPlot, type Line} from '../core/series';
+import {bandOf, maxMarks, SeriesPlot, type Line} from '../core/series';
 import {extent, quantile, scaled} from '../core/stats';
 import {observeScene, type ObserveScene} from './observe_scene';
 
@@ -59,7 +59,7 @@ export const observeIntrinsics: Figure = {
     if (known > 0) keys.push({words: 'truth', colour: 'var(--ink)', look: 'dash'}, {words: 'below: |estimate − truth|', colour: 'var(--soft)'});
     if (columns.some((c) => c.bound.some(Number.isFinite))) keys.push({words: 'below: 3σ at best', colour: 'var(--orange)', look: 'dash'});
     if (scene.zooms.length > 0) keys.push({words: 'zooming', colour: 'var(--orange)', look: 'band'});
-    if (scene.events.length > 0) keys.push({words: `events: ${scene.events.length > mostMarks ? 'ticks' : 'triangles'} above`, colour: 'var(--orange)', look: 'square'});
+    if (scene.events.length > 0) keys.push({words: `events: ${scene.events.length > maxMarks ? 'ticks' : 'triangles'} above`, colour: 'var(--orange)', look: 'square'});
     legend(host, keys);
     const grid = el('div', {class: 'grid2'});
     host.append(grid);

@@ -9,7 +9,7 @@ import {observeScene} from './observe_scene';
 const colours = ['blue', 'orange', 'green'] as const;
 
 function linesOf(steps: Table, wanted: [string, string][]): Line[] {
-  return wanted.filter(([column]) => steps.tells(column)).map(([column, name], i) => ({name, values: scaled(steps.numbers(column), degrees), colour: colours[i]!, dash: [[], [7, 3], [2, 3]][i]}));
+  return wanted.filter(([column]) => steps.hasValues(column)).map(([column, name], i) => ({name, values: scaled(steps.numbers(column), degrees), colour: colours[i]!, dash: [[], [7, 3], [2, 3]][i]}));
 }
 function lastOf(values: Float64Array): number {
   for (let i = values.length; i-- > 0;) if (Number.isFinite(values[i]!)) return values[i]!;

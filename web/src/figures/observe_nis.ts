@@ -8,7 +8,7 @@ export const observeNis: Figure = {
   id: 'nis', title: 'Does each frame fit?', note: 'NIS', span: 8,
   draw(host, doc, selection) {
     const scene = observeScene(doc);
-    if (!scene || !scene.steps.tells('nis')) return null;
+    if (!scene || !scene.steps.hasValues('nis')) return null;
     const dof = scene.steps.numbers('nis_dof');
     legend(host, [{words: 'a frame', colour: 'var(--blue)', look: 'dot'}, {words: '95 % of frames', colour: 'var(--blue)', look: 'band'}, {words: 'mean', colour: 'var(--orange)'}]);
     const share = drawNis(host, {t: scene.t, nis: scene.steps.numbers('nis'), dof: (i) => Math.floor(dof[i]!), counts: (i) => scene.steps.text('event', i) === '', selection,

@@ -3,7 +3,7 @@ import {Chart, type Pen} from '../core/chart';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
 import {num} from '../core/format';
-import {panelIn} from '../core/picture';
+import {panelIn} from '../core/panel';
 import {scale, xAxis, yAxis} from '../core/scale';
 import {extent, lengths, quantile, roundUp125} from '../core/stats';
 import type {Doc} from '../core/document';
@@ -67,7 +67,7 @@ export const observePoints: Figure = {
     if (!table) return null;
     const du = table.numbers('residual_u_px'), dv = table.numbers('residual_v_px'), sizes = lengths(du, dv), known = sizes.filter(Number.isFinite).length;
     if (known === 0) return null;
-    const told = doc.estimate('sigma_px'), sigma_px = told > 0 ? told : quantile(sizes, 0.5) / 1.1774; // √(2 ln 2): median of a normal vector's length
+    const given = doc.estimate('sigma_px'), sigma_px = given > 0 ? given : quantile(sizes, 0.5) / 1.1774; // √(2 ln 2): median of a normal vector's length
     const limit = roundUp125(Math.max(1.05 * quantile(sizes, 0.998), 3.3 * sigma_px)), points = byPoint(table.numbers('point'), sizes);
     const inside = sizes.filter((s) => s <= 3 * sigma_px).length, row = el('div', {class: 'row'}), left = el('div'), right = el('div');
     host.append(row);
@@ -81,14 +81,14 @@ export const observePoints: Figure = {
 
 function frameOf(doc: Doc, u: Float64Array, v: Float64Array): {width: number; height: number} | null {
   const ends = [extent(u), extent(v)];
-  return doc.pictureSize ?? (ends[0] && ends[1] ? {width: ends[0][1] * 1.05 + 1, height: ends[1][1] * 1.05 + 1} : null);
+  return doc.imageSize ?? (ends[0] && ends[1] ? {width: ends[0][1] * 1.05 + 1, height: ends[1][1] * 1.05 + 1} : null);
 }
 
 export const observeTracks: Figure = {
   id: 'tracks', title: 'Where were the points seen?', note: 'in the image', span: 8,
   draw(host, doc) {
     const table = doc.table('points');
-    if (!table || !table.tells('u_px')) return null;
+    if (!table || !table.hasValues('u_px')) return null;
     const u = table.numbers('u_px'), v = table.numbers('v_px'), point = table.numbers('point'), size = frameOf(doc, u, v);
     if (!size) return null;
     const tracks = new Map<number, number[]>();

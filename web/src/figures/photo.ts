@@ -4,8 +4,8 @@ import {css, directionColour} from '../core/colours';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
 import {num, rounded} from '../core/format';
-import {imageOf, whenPicturesAreHere} from '../core/images';
-import {ellipsePlaces, magnificationFor, panelIn, type Panel} from '../core/picture';
+import {imageOf, whenImagesAreHere} from '../core/images';
+import {ellipsePlaces, magnificationFor, panelIn, type Panel} from '../core/panel';
 import {lengths, quantile, roundDown125} from '../core/stats';
 import {calibrateScene, type Corners, type Photo} from './calibrate_scene';
 
@@ -72,7 +72,7 @@ export const photo: Figure = {
     };
     slider.addEventListener('input', () => chart.redraw());
     selection.on(update);
-    whenPicturesAreHere(update);
+    whenImagesAreHere(update);
     update();
     const marks = scene.photos[selection.item]?.corners.length ?? 0;
     return {marks, rows: marks, tables: corners ? [corners.table] : [], words: caption.textContent ?? '',

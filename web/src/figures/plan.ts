@@ -4,7 +4,7 @@ import type {Doc, Table} from '../core/document';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
 import {degrees, fixed, num, rounded} from '../core/format';
-import {panelIn} from '../core/picture';
+import {panelIn} from '../core/panel';
 import {add, column, identity, isFinite3, lensOf, move, mul, norm, poseOf, unit, type Lens, type Pose, type V3} from '../core/rigid';
 import {scale, xAxis, yAxis} from '../core/scale';
 import {extent} from '../core/stats';
@@ -173,7 +173,7 @@ export const planRangefinder: Figure = {
 };
 
 
-/** The picture's outline at the turns, in degrees of pan and tilt from where the camera looks now. */
+/** The image's outline at the turns, in degrees of pan and tilt from where the camera looks now. */
 function drawTurns(pen: Pen, next: Table, half: [number, number]): void {
   const stops: [number, number][] = [[0, 0], ...Array.from({length: Math.min(20, next.rows)}, (_, i): [number, number] => [degrees * next.number('pan_rad', i), degrees * next.number('tilt_rad', i)])];
   const xs = extent(stops.map(([pan]) => pan))!, ys = extent(stops.map(([, tilt]) => tilt))!, w = pen.w - 62, h = pen.h - 62, margin = 1.06;
@@ -204,7 +204,7 @@ export const planObserve: Figure = {
   id: 'plan', title: 'How should the head turn?', note: 'from where the camera looks now · frames: the image', span: 16,
   draw(host, doc) {
     const next = doc.table('next');
-    if (!next || !next.tells('pan_rad')) return null;
+    if (!next || !next.hasValues('pan_rad')) return null;
     const row = el('div', {class: 'split'}), left = el('div', {class: 'wide'}), right = el('div'), lens = lensOf(doc);
     const half: [number, number] = lens ? [degrees * Math.atan(lens.width / 2 / lens.fx), degrees * Math.atan(lens.height / 2 / lens.fy)] : [0, 0];
     host.append(row);

@@ -3,7 +3,7 @@ import {cividis, pixelShare} from '../core/colours';
 import type {Table} from '../core/document';
 import type {Figure} from '../core/figure';
 import {num} from '../core/format';
-import {hasPicture, whenPicturesAreHere} from '../core/images';
+import {hasImage, whenImagesAreHere} from '../core/images';
 import {halfAxes, lensOf, identity, isFinite3, move, mul, norm, type M3, type Pose, type V3} from '../core/rigid';
 import {roundDown125} from '../core/stats';
 import {View3} from '../core/view3';
@@ -63,7 +63,7 @@ export const poses: Figure = {
         const corners = world.frustum(identity, [lens.width / 2 / lens.fx, lens.height / 2 / lens.fy], 0.55 * nearest, {colour: 'ink', width: 2});
         world.hold([0, 0, 0], ...corners);
         const chosen = scene.photos[selection.item];
-        if (chosen && hasPicture(chosen.name)) world.pictures.push({corners, name: chosen.name});
+        if (chosen && hasImage(chosen.name)) world.textures.push({corners, name: chosen.name});
       }
       world.axes(identity, 0.28 * nearest);
       world.hold([0.3 * nearest, 0, 0], [0, 0.36 * nearest, 0]);
@@ -72,7 +72,7 @@ export const poses: Figure = {
     const view = new View3(host, {height: 420, isFilling: true, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.75, pitch: 0.35,
       note: `colour: RMS, as on the map of 3σ${factor > 0 ? `; red: 3σ of the chosen board’s place, ${num(factor, 2)} ×` : ''}`, label: `${posed.length} poses of the board in front of the camera`}, make);
     selection.on(() => view.refresh());
-    whenPicturesAreHere(() => view.refresh());
+    whenImagesAreHere(() => view.refresh());
     return {marks: posed.length, rows: scene.photos.filter((photo) => photo.pose).length, tables: [table],
       words: `${posed.length} boards, from ${num(nearest, 2)} m`, good: 'Good: boards tilted all ways, near and far, out to the image’s corners.'};
   },

@@ -4,7 +4,7 @@ import type {Table} from '../core/document';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
 import {num, withSigma} from '../core/format';
-import {ellipsePlaces} from '../core/picture';
+import {ellipsePlaces} from '../core/panel';
 import {faded} from '../core/colours';
 import {scale, xAxis, yAxis} from '../core/scale';
 import {extent} from '../core/stats';
@@ -32,18 +32,18 @@ function drawPoints(pen: Pen, points: Table): void {
   });
 }
 
-export const projectPicture: Figure = {
+export const projectImage: Figure = {
   id: 'picture', isOptional: true, title: 'Where in the image does it lie?', note: 'px · ellipse: 3σ', span: 16,
   draw(host, doc) {
     const points = doc.table('points');
-    if (!points || !points.tells('u_px')) return null;
+    if (!points || !points.hasValues('u_px')) return null;
     const count = Math.min(most, points.rows);
     new Chart(host, {height: 360, isFilling: true, label: `${points.rows} readings in the image`}, (pen) => drawPoints(pen, points));
     return {marks: count, rows: count, tables: [points], words: `${points.rows} readings`, good: `Dots: where the point of a reading is seen${points.rows > 1 ? '; line: along the beam, from near to far' : ''}.`};
   },
 };
 
-/** Of a rig: the pixel of the point in each head's picture. */
+/** Of a rig: the pixel of the point in each head's image. */
 export const projectHeads: Figure = {
   id: 'heads', isOptional: true, title: 'Where does each head see the point?', note: 'px', span: 12,
   draw(host, doc) {

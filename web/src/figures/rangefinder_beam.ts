@@ -9,7 +9,7 @@ import {World} from '../core/world';
 import {coneSigmas, covOrigin, pointAt, rangefinderScene, type RangefinderScene, type Shot} from './rangefinder_scene';
 import type {Selection} from '../core/selection';
 
-const mostShots = 400;
+const maxShots = 400;
 
 /** Corners of the board's paper, one square beyond the outermost; else a patch of the plane around the hit. */
 function sheet(scene: RangefinderScene, shot: Shot): V3[] | null {
@@ -46,7 +46,7 @@ function cone(world: World, scene: RangefinderScene, from_m: number, to_m: numbe
 
 function wholeWorld(scene: RangefinderScene, selection: Selection, longest: number, factor: number): World {
   const world = new World(), {beam, lens} = scene;
-  scene.shots.slice(0, mostShots).forEach((shot, i) => {
+  scene.shots.slice(0, maxShots).forEach((shot, i) => {
     const corners = sheet(scene, shot), isChosen = i === selection.item, colour = isChosen ? 'orange' : shot.isUsed ? 'blue' : 'soft';
     const touch = {pick: () => selection.choose(i), tip: () => [shot.name, `range ${num(shot.range_m, 4)} m`, shot.isUsed ? `residual ${num(1e3 * shot.dRange_m, 2)} mm` : `not used: ${shot.reason}`]};
     if (corners) world.face(corners, colour, isChosen ? 0.4 : 0.16, touch), world.line(corners, {colour, width: isChosen ? 3 : 1.3, opacity: shot.isUsed ? 1 : 0.5}, true);
@@ -101,6 +101,6 @@ export const rangefinderBeam: Figure = {
       right.append(el('p', {class: 'caption'}, `at the camera: ${num(1e3 * norm(beam.origin), 3)} mm from its centre`));
       new View3(right, {height: 300, isFilling: true, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.6, pitch: 0.35, label: words, note: `3σ ×${nearFactor}`}, () => nearWorld(scene, nearFactor));
     }
-    return {marks: Math.min(mostShots, shots.length), rows: Math.min(mostShots, shots.length), tables: [scene.table], words, good: beam ? 'Good: hits from near to far, boards tilted to all sides; a thin cone and a small ellipsoid.' : 'No beam is drawn: these boards do not determine it. Good would be boards tilted to all sides, from near to far.'};
+    return {marks: Math.min(maxShots, shots.length), rows: Math.min(maxShots, shots.length), tables: [scene.table], words, good: beam ? 'Good: hits from near to far, boards tilted to all sides; a thin cone and a small ellipsoid.' : 'No beam is drawn: these boards do not determine it. Good would be boards tilted to all sides, from near to far.'};
   },
 };

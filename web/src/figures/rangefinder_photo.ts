@@ -3,8 +3,8 @@ import {Chart, type Pen} from '../core/chart';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
 import {num} from '../core/format';
-import {imageOf, whenPicturesAreHere} from '../core/images';
-import {ellipsePlaces, panelIn, type Panel} from '../core/picture';
+import {imageOf, whenImagesAreHere} from '../core/images';
+import {ellipsePlaces, panelIn, type Panel} from '../core/panel';
 import {pointAt, rangefinderScene, type RangefinderScene, type Shot} from './rangefinder_scene';
 import {thumbnails} from './all_photos';
 
@@ -39,7 +39,7 @@ function drawInset(pen: Pen, scene: RangefinderScene, shot: Shot, whole: Panel, 
       const perPixel = image.naturalWidth / scene.lens!.width;
       pen.g.drawImage(image, (shot.u + 0.5 - half_px) * perPixel, (shot.v + 0.5 - half_px) * perPixel, 2 * half_px * perPixel, 2 * half_px * perPixel, left, top, size, size);
     }
-    if (scene.beam) { // the stretch that passes: the line of the whole picture is too coarse here
+    if (scene.beam) { // the stretch that passes: the line of the whole image is too coarse here
       const places: number[] = [];
       for (let i = 0; i <= 60; ++i) {
         const at = scene.lens!.project(pointAt(scene.beam, shot.range_m * (0.5 + i / 60)));
@@ -92,7 +92,7 @@ export const rangefinderPhoto: Figure = {
       chart.redraw();
     };
     selection.on(update);
-    whenPicturesAreHere(update);
+    whenImagesAreHere(update);
     update();
     const marks = scene.shots.filter((s) => Number.isFinite(s.u)).length;
     return {marks, rows: marks, tables: [scene.table], words: caption.textContent ?? '', good: 'Good: the seen spot (cross) inside the yellow 3σ of the predicted one (ring), on the line. Dots: spots of all shots.'};

@@ -4,7 +4,7 @@ import {css, cividis, faded, onto} from '../core/colours';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
 import {degrees, num} from '../core/format';
-import {ellipsePlaces} from '../core/picture';
+import {ellipsePlaces} from '../core/panel';
 import {dot, cross, unit, type V3} from '../core/rigid';
 import {scale, xAxis, yAxis} from '../core/scale';
 import {extent, finite, roundUp125} from '../core/stats';

@@ -17,7 +17,7 @@ interface Column {
 /** Of the numbers only those that the run has: "as printed" where something is printed. */
 function columnsOf(table: Table): Column[] {
   const all: Column[] = [{name: 'printed', words: 'as printed'}, {name: 'ours', words: 'paper’s method, re-run'}, {name: 'best', words: 'ours'}, {name: 'ratio', words: 're-run / printed'}, {name: 'bound', words: 'bound'}];
-  return all.filter(({name}) => table.tells(name));
+  return all.filter(({name}) => table.hasValues(name));
 }
 
 const wordOf: Record<string, string> = {good: 'reproduced', care: 'in shape', bad: 'not reproducible'};
@@ -156,7 +156,7 @@ export function reproduceFigure(table: Table, doc: Doc): Figure {
         else drawSpots(host, table, (name) => lineOf(`${name}_px`).words);
         return {marks: table.rows, rows: table.rows, tables: [table], words: said.title, good: said.caption};
       }
-      const names = table.names.filter((name) => name !== 'label' && table.tells(name)), across = names[0], lines = names.slice(1).map(lineOf);
+      const names = table.names.filter((name) => name !== 'label' && table.hasValues(name)), across = names[0], lines = names.slice(1).map(lineOf);
       if (!across || lines.length === 0 || finite(table.numbers(across)).length === 0) return null;
       const byUnit = new Map<string, Line[]>();
       for (const line of lines) byUnit.set(unitOf(line.name), [...(byUnit.get(unitOf(line.name)) ?? []), line]);

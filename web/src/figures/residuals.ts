@@ -4,7 +4,7 @@ import {cividis, css, directionColour, pixelShare} from '../core/colours';
 import type {Table} from '../core/document';
 import {choice, type Figure} from '../core/figure';
 import {num, percent} from '../core/format';
-import {directionWheel, magnificationFor, panelIn, type Panel} from '../core/picture';
+import {directionWheel, magnificationFor, panelIn, type Panel} from '../core/panel';
 import {linearTicks, scale} from '../core/scale';
 import {lengths, quantile} from '../core/stats';
 import {calibrateScene, type Corners} from './calibrate_scene';

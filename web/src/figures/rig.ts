@@ -5,7 +5,7 @@ import type {Doc, Table} from '../core/document';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
 import {degrees, num, times, valueText} from '../core/format';
-import {colourBar, magnificationFor, panelIn} from '../core/picture';
+import {colourBar, magnificationFor, panelIn} from '../core/panel';
 import {add, mul, norm, poseOf, rotationOf, sub, unit, type Pose, type V3} from '../core/rigid';
 import type {Selection} from '../core/selection';
 import {lengths, quantile} from '../core/stats';
@@ -78,7 +78,7 @@ export const rigSpace: Figure = {
   draw(host, doc, selection) {
     const views = viewsOf(doc, selection);
     if (!views || (!headPose(doc, 0) && !doc.table('axes'))) return null;
-    const posed = views.tells('world_from_cam_x_m');
+    const posed = views.hasValues('world_from_cam_x_m');
     legend(host, [...(doc.table('axes') ? [{words: 'pan axis', colour: 'var(--green)'}, {words: 'tilt axis', colour: 'var(--orange)'}] : []),
       ...(posed ? [...headsOf(views).slice(0, 4).map((head, k) => ({words: `views of head ${head}`, colour: `var(--${headColours[k]!})`, look: 'square' as const})), {words: 'the chosen view', colour: 'var(--red)', look: 'square' as const}] : []), {words: '3σ of the other head', colour: 'var(--red)', look: 'ring'}]);
     const label = `${headsOf(views).length} heads in space`;
@@ -94,8 +94,8 @@ export const rigCoverage: Figure = {
   id: 'coverage', title: 'Which angles were covered?', note: 'readings of pan and tilt, ° · colour: RMS', span: 12,
   draw(host, doc, selection) {
     const views = viewsOf(doc, selection);
-    if (!views || !views.tells('pan_rad')) return null;
-    const heads = headsOf(views), row = el('div', {class: 'row'}), charts: Chart[] = [], has = views.tells('rms_px');
+    if (!views || !views.hasValues('pan_rad')) return null;
+    const heads = headsOf(views), row = el('div', {class: 'row'}), charts: Chart[] = [], has = views.hasValues('rms_px');
     host.append(row);
     heads.slice(0, 4).forEach((head) => {
       const part = el('div'), dots: ScatterDot[] = [];
@@ -120,7 +120,7 @@ export const rigResiduals: Figure = {
   id: 'residuals', title: 'Do residuals follow the angles?', note: 'correction of each reading, ° · triangle: travel', span: 12,
   draw(host, doc, selection) {
     const views = viewsOf(doc, selection);
-    if (!views || !views.tells('pan_correction_rad') || !doc.isAnswer) return null;
+    if (!views || !views.hasValues('pan_correction_rad') || !doc.isAnswer) return null;
     const heads = headsOf(views), charts: Chart[] = [], row = el('div', {class: 'row'});
     legend(host, heads.slice(0, 4).map((head, k) => ({words: `head ${head}`, colour: `var(--${headColours[k]!})`, look: 'dot'})));
     host.append(row);

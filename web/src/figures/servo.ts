@@ -44,7 +44,7 @@ export const servoError: Figure = {
   id: 'error', title: 'How far from the centre was the target?', note: 'px, ± 3σ predicted', span: 14,
   draw(host, doc, selection) {
     const control = doc.table('control');
-    if (!control || !control.tells('error_u_px')) return null;
+    if (!control || !control.hasValues('error_u_px')) return null;
     const spec = doc.estimate('specification_px'), heads = headsOf(control), levels: Level[] = [{value: 0, dash: []}];
     if (spec > 0) levels.push({value: spec, words: `specification ${num(spec, 3)} px`, colour: 'red'}, {value: -spec, colour: 'red'});
     let inside = 0, known = 0;
@@ -64,11 +64,11 @@ export const servoError: Figure = {
   },
 };
 
-export const servoPicture: Figure = {
+export const servoImage: Figure = {
   id: 'picture', title: 'Where in the image was it?', note: 'target from the image’s centre, px', span: 10,
   draw(host, doc, selection) {
     const control = doc.table('control');
-    if (!control || !control.tells('error_u_px')) return null;
+    if (!control || !control.hasValues('error_u_px')) return null;
     const heads = headsOf(control), spec = doc.estimate('specification_px'), charts: Chart[] = [];
     const reach = quantile([...control.numbers('error_u_px'), ...control.numbers('error_v_px')].map(Math.abs), 0.999);
     perHead(host, heads, (part, head) => {
@@ -85,7 +85,7 @@ export const servoAngles: Figure = {
   id: 'angles', title: 'Did the head follow?', note: 'asked · measured · predicted, °; rate, °/s', span: 14,
   draw(host, doc, selection) {
     const control = doc.table('control');
-    if (!control || !control.tells('measured_pan_rad')) return null;
+    if (!control || !control.hasValues('measured_pan_rad')) return null;
     legend(host, [{words: 'asked', colour: 'var(--ink)', look: 'dash'}, {words: 'measured', colour: 'var(--blue)'}, {words: 'predicted', colour: 'var(--orange)'}, {words: 'rate', colour: 'var(--green)'}]);
     perHead(host, headsOf(control), (part, head) => {
       const c = (name: string) => scaled(head.column(name), degrees);
@@ -163,7 +163,7 @@ export const servoFocal: Figure = {
   id: 'focal', title: 'Which focal length does the loop go by?', note: 'px, ± 3σ', span: 14, isOptional: true,
   draw(host, doc, selection) {
     const control = doc.table('control');
-    if (!control || !control.tells('true_fx_px') || !doc.table('lenses')) return null;
+    if (!control || !control.hasValues('true_fx_px') || !doc.table('lenses')) return null;
     let within = 0, known = 0;
     control.numbers('fx_px').forEach((v, i) => {
       const s = control.number('sigma_fx_px', i);

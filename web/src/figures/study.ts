@@ -12,7 +12,7 @@ export const studyCurve: Figure = {
   id: 'curve', isOptional: true, title: 'How good against what is varied?', note: 'RMS error over the bound; share inside 1σ and 2σ', span: 24,
   draw(host, doc) {
     const table = doc.table('quantities');
-    if (!table || !table.tells('varied')) return null;
+    if (!table || !table.hasValues('varied')) return null;
     const varied = table.numbers('varied'), ratio = table.numbers('rms_over_bound'), names = [...new Set(Array.from(varied.keys(), (i) => table.text('quantity', i)))];
     const rowsOf = (name: string) => Array.from(varied.keys()).filter((i) => table.text('quantity', i) === name && Number.isFinite(varied[i]!));
     const shown = names.slice(0, colours.length), ends = extent(varied), highest = extent(ratio, [1]);

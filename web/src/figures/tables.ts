@@ -4,7 +4,7 @@ import type {Figure} from '../core/figure';
 import {num} from '../core/format';
 
 /** Most rows that a page shows; the files beside it have all. */
-const mostRows = 400;
+const maxRows = 400;
 
 export interface TableColumn {
   name: string;
@@ -20,7 +20,7 @@ export function tableFigure(id: string, tableName: string, title: string, note: 
       const table = doc.table(tableName);
       if (!table || table.rows === 0) return null;
       const isText = (name: string) => !Number.isFinite(table.number(name, 0)) && table.text(name, 0) !== '';
-      const shown = columns.filter(({name}) => table.has(name) && (table.tells(name) || isText(name))), rows = Math.min(table.rows, mostRows), body = el('tbody');
+      const shown = columns.filter(({name}) => table.has(name) && (table.hasValues(name) || isText(name))), rows = Math.min(table.rows, maxRows), body = el('tbody');
       for (let i = 0; i < rows; ++i)
         body.append(el('tr', {}, ...shown.map(({name, digits}) => {
           const value = table.number(name, i);

@@ -153,7 +153,7 @@ export const trackError: Figure = {
 
 function sightsOf(doc: Doc): Table | null {
   const sights = doc.table('measurements');
-  return sights && sights.tells('t_capture_s') ? sights : null;
+  return sights && sights.hasValues('t_capture_s') ? sights : null;
 }
 /** Rows in order of a time, as a plot needs them. */
 function sorted(t: Float64Array): number[] {
@@ -164,7 +164,7 @@ export const trackInnovations: Figure = {
   id: 'innovations', title: 'Does each observation fit?', note: 'innovation, px, ± 3σ predicted', span: 12,
   draw(host, doc, selection) {
     const sights = sightsOf(doc);
-    if (!sights || !sights.tells('innovation_u_px')) return null;
+    if (!sights || !sights.hasValues('innovation_u_px')) return null;
     const order = sorted(sights.numbers('t_capture_s')), pick = (name: string) => Float64Array.from(order, (i) => sights.number(name, i)), t = pick('t_capture_s'), accepted = pick('accepted');
     const hasInnovation = pick('innovation_u_px').map((v, i) => Number(Number.isFinite(v) && accepted[i] === 0)), dropped = hasInnovation.reduce((a, b) => a + b, 0);
     legend(host, [{words: 'used', colour: 'var(--blue)', look: 'dot'}, {words: `rejected (${dropped})`, colour: 'var(--red)', look: 'dot'}, {words: '± 3σ', colour: 'var(--blue)', look: 'band'}]);
@@ -185,7 +185,7 @@ export const trackAge: Figure = {
   id: 'age', title: 'How old is an observation when it arrives?', note: 'arrival − capture, ms', span: 6,
   draw(host, doc, selection) {
     const sights = sightsOf(doc);
-    if (!sights || !sights.tells('t_arrival_s')) return null;
+    if (!sights || !sights.hasValues('t_arrival_s')) return null;
     const capture = sights.numbers('t_capture_s'), arrival = sights.numbers('t_arrival_s'), order = sorted(capture), age = Float64Array.from(order, (i) => 1e3 * (arrival[i]! - capture[i]!));
     const middle = quantile(age, 0.5), worst = quantile(age, 1);
     new SeriesPlot(host, {t: Float64Array.from(order, (i) => capture[i]!), selection, label: 'age, ms', xLabel: 'time of capture, s', height: 220, isFilling: true, aria: 'age of each observation', lines: [{name: 'age', values: age, colour: 'blue', isDots: true}], range: [0, Math.max(1, 1.25 * worst)],

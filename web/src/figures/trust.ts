@@ -4,7 +4,7 @@ import type {Grid} from '../core/document';
 import {el} from '../core/dom';
 import {choice, legend, type Figure} from '../core/figure';
 import {num} from '../core/format';
-import {colourBar, drawContours, drawHeat, panelIn, valueAt, type Panel} from '../core/picture';
+import {colourBar, drawContours, drawHeat, panelIn, valueAt, type Panel} from '../core/panel';
 import {scale, yAxis, type Scale} from '../core/scale';
 import {finite, quantile, scaled} from '../core/stats';
 import {pixelHigh, pixelLow} from '../core/colours';

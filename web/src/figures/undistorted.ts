@@ -1,7 +1,7 @@
 // Are straight lines straight? A photo as taken, and undistorted.
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
-import {imageOf, pictureNames, whenPicturesAreHere} from '../core/images';
+import {imageOf, imageNames, whenImagesAreHere} from '../core/images';
 import {calibrateScene} from './calibrate_scene';
 
 const prefix = 'undistorted:';
@@ -13,18 +13,18 @@ export const undistorted: Figure = {
     if (!photos.some((photo) => photo.isUsed) || !doc.isAnswer) return null;
     const pair = el('div', {class: 'pair'});
     host.append(pair);
-    whenPicturesAreHere(() => {
-      const name = pictureNames().find((one) => one.startsWith(prefix));
-      // Pictures stand behind the document: only now is known whether there is one.
+    whenImagesAreHere(() => {
+      const name = imageNames().find((one) => one.startsWith(prefix));
+      // Images stand behind the document: only now is known whether there is one.
       if (!name) {
         host.closest('section')?.remove();
         document.getElementById('fig-halves')?.style.setProperty('--span', '24');
         return;
       }
-      for (const [picture, words] of [[name.slice(prefix.length), 'as taken'], [name, 'undistorted']] as const) {
+      for (const [shownName, words] of [[name.slice(prefix.length), 'as taken'], [name, 'undistorted']] as const) {
         const figure = el('figure', {}, el('figcaption', {class: 'caption'}, `${name.slice(prefix.length)}, ${words}`));
         const show = () => {
-          const image = imageOf(picture, show);
+          const image = imageOf(shownName, show);
           if (image) figure.prepend(el('img', {src: image.src, alt: `${words}`}));
         };
         show();

@@ -8,7 +8,7 @@ import type {Message} from './connection';
 import type {HeadRows} from './rows';
 
 const looks = {connecting: ['○', 'connecting', 'unknown'], live: ['●', 'live', 'good'], lost: ['✕', 'stopped', 'bad']} as const;
-const mostLog = 6;
+const maxLog = 6;
 
 function clock(seconds: number): string {
   if (!Number.isFinite(seconds)) return '–';
@@ -79,7 +79,7 @@ export class LiveBar {
   }
   private add(level: string, words: string): void {
     this.logged.append(el('li', {class: level}, level === 'warning' ? '▲ ' : '', words));
-    while (this.logged.childElementCount > mostLog) this.logged.firstElementChild!.remove();
+    while (this.logged.childElementCount > maxLog) this.logged.firstElementChild!.remove();
   }
   drawn(): void {
     this.facts.textContent = this.words();

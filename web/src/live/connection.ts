@@ -11,7 +11,7 @@ export interface Listener {
 }
 
 const names = ['foxglove.sdk.v1', FoxgloveClient.SUPPORTED_SUBPROTOCOL];
-const look_ms = 200, mostSilent = 9; // looks without a word: the server tells the time once a second
+const look_ms = 200, maxSilent = 9; // looks without a word: the server tells the time once a second
 
 /** Subscribes to everything. `close` ends it without a word to the listener. */
 export function connect(listener: Listener): {close: () => void} {
@@ -25,7 +25,7 @@ export function connect(listener: Listener): {close: () => void} {
     listener.closed();
   };
   // A machine that is gone closes nothing. Looks are counted, not time: a page that was busy has not listened.
-  const watch = setInterval(() => silent >= 0 && ++silent === mostSilent && listener.silent(), look_ms);
+  const watch = setInterval(() => silent >= 0 && ++silent === maxSilent && listener.silent(), look_ms);
   client.on('advertise', (channels) => {
     for (const channel of channels) topics.set(client.subscribe(channel.id), channel.topic);
     listener.opened();
@@ -35,7 +35,7 @@ export function connect(listener: Listener): {close: () => void} {
     listener.message(topics.get(event.subscriptionId) ?? '', JSON.parse(decoder.decode(event.data)) as Message);
   });
   client.on('time', () => {
-    if (silent >= mostSilent) listener.opened();
+    if (silent >= maxSilent) listener.opened();
     silent = 0;
   });
   client.on('status', (event) => listener.status(event.level, event.message));

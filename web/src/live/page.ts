@@ -11,7 +11,7 @@ import {listenToKeys} from '../page/keys';
 import {LiveBar} from './bar';
 import {connect, type Message} from './connection';
 import {livePlots, plotsOf, type LivePlot} from './plots';
-import {LivePicture} from './picture';
+import {LiveImage} from './image';
 import {HeadRows} from './rows';
 import {Space, type Calibration} from './space';
 
@@ -20,7 +20,7 @@ export function isLive(doc: Doc): boolean {
   return location.protocol.startsWith('http') && doc.isReadable && (doc.json as Message)['live'] === true;
 }
 
-const least_ms = 30; // between two drawings: more is not seen
+const min_interval_ms = 30; // between two drawings: more is not seen
 
 class LivePage {
   private readonly rows = new HeadRows();
@@ -29,7 +29,7 @@ class LivePage {
   private readonly main = el('main');
   private readonly cards: Card[] = [];
   private readonly plots: LivePlot[] = [];
-  private readonly pictures = new Map<string, LivePicture>();
+  private readonly images = new Map<string, LiveImage>();
   private readonly space: Space | null;
   private readonly cameras = new Map<string, Calibration>();
   private readonly choices: HTMLElement[] = [];
@@ -82,7 +82,7 @@ class LivePage {
 
   private take(topic: string, message: Message): void {
     const part = /^\/(head\d+)\/(camera|marks|image)$/.exec(topic);
-    if (part) return this.takePicture(part[1]!, part[2]!, message);
+    if (part) return this.takePart(part[1]!, part[2]!, message);
     if (topic === '/tf') return this.space?.takeFrames(message);
     if (topic === '/scene') return this.space?.takeScene(message);
     if (topic === '/progress') return this.bar.progress(message);
@@ -93,33 +93,33 @@ class LivePage {
     this.bar.takeRow(message, this.rows);
     this.isFresh = true;
   }
-  private takePicture(head: string, part: string, message: Message): void {
+  private takePart(head: string, part: string, message: Message): void {
     if (part === 'camera') this.cameras.set(head, message as unknown as Calibration), this.space?.cameras.set(head, message as unknown as Calibration);
-    let picture = this.pictures.get(head);
-    if (!picture && part === 'camera') return; // nothing to show in it yet
-    if (!picture) {
+    let image = this.images.get(head);
+    if (!image && part === 'camera') return; // nothing to show in it yet
+    if (!image) {
       const isAlone = ['localize', 'head'].includes(this.doc.command);
       const body = this.card(head, isAlone ? 'What does it see?' : `What does ${head.replace('head', 'head ')} see?`, this.doc.command === 'head' ? 'dot: the target' : 'ring: 3σ, dot: seen', isAlone ? 12 : 6);
       const section = body.parentElement!, first = this.main.querySelector('#fig-space') ?? this.main.firstElementChild;
-      const before = [...this.pictures.keys()].length > 0 ? this.main.querySelector(`#fig-${[...this.pictures.keys()].pop()}`) : first;
+      const before = [...this.images.keys()].length > 0 ? this.main.querySelector(`#fig-${[...this.images.keys()].pop()}`) : first;
       before?.after(section);
-      this.pictures.set(head, (picture = new LivePicture(body, head)));
+      this.images.set(head, (image = new LiveImage(body, head)));
     }
-    picture.camera = this.cameras.get(head) ?? null;
-    if (part === 'marks') picture.takeMarks(message);
-    else if (part === 'image') void picture.takeImage(message).then(() => (this.isFresh = true));
+    image.camera = this.cameras.get(head) ?? null;
+    if (part === 'marks') image.takeMarks(message);
+    else if (part === 'image') void image.takeImage(message).then(() => (this.isFresh = true));
   }
 
   private step(): void {
     const now = performance.now();
     this.bar.tick(now);
-    if (this.isHeld || !this.isFresh || now - this.drawn_ms < least_ms) return;
+    if (this.isHeld || !this.isFresh || now - this.drawn_ms < min_interval_ms) return;
     this.isFresh = false;
     this.drawn_ms = now;
     this.offerHeads();
     const end = this.rows.time, begin = this.span_s > 0 ? Math.max(this.rows.first, end - this.span_s) : this.rows.first;
     if (Number.isFinite(end)) for (const plot of this.plots) plot.follow([begin, Math.max(end, begin + 0.5)]);
-    for (const picture of this.pictures.values()) picture.redraw();
+    for (const image of this.images.values()) image.redraw();
     // Space takes ten times as long as the rest where there is no graphics processor: it gets a sixth of the time.
     if (this.space && now - this.spaceDrawn_ms > Math.max(200, 8 * this.spaceTook_ms)) {
       this.spaceDrawn_ms = now;

@@ -78,7 +78,7 @@ export const plotsOf: Record<string, PlotCard[]> = {
   ],
 };
 
-const mostPoints = 900; // more than pixels across, mostly
+const maxPoints = 900; // more than pixels across, mostly
 
 /** A plot that follows rows. */
 export class LivePlot {
@@ -93,7 +93,7 @@ export class LivePlot {
   follow(span: [number, number]): void {
     const rows = this.rows();
     if (!rows || rows.count === 0) return;
-    const first = Math.max(0, rows.from(span[0]) - 1), every = Math.ceil((rows.count - first) / mostPoints), plot = this.plot, factor = plot.scale ?? 1;
+    const first = Math.max(0, rows.from(span[0]) - 1), every = Math.ceil((rows.count - first) / maxPoints), plot = this.plot, factor = plot.scale ?? 1;
     const column = (name: string) => scaled(rows.slice(name, first, every), factor);
     const t = rows.slice('', first, every), values = plot.lines.map((line) => this.valuesOf(line, rows, first, every, column));
     const sigma = plot.sigma ? column(plot.sigma) : null, bands = [];

@@ -1,6 +1,6 @@
 // Rows of a live run as they come, of each head by itself, as columns.
 
-const mostRows = 36_000; // of a head: ten minutes at 60 a second
+const maxRows = 36_000; // of a head: ten minutes at 60 a second
 
 export class Rows {
   readonly t: number[] = [];
@@ -15,8 +15,8 @@ export class Rows {
       column.push(typeof value === 'number' ? value : typeof value === 'boolean' ? Number(value) : NaN);
     }
     for (const column of this.columns.values()) if (column.length < this.t.length) column.push(NaN);
-    if (this.t.length <= mostRows) return;
-    for (const column of [this.t, ...this.columns.values()]) column.splice(0, mostRows / 4);
+    if (this.t.length <= maxRows) return;
+    for (const column of [this.t, ...this.columns.values()]) column.splice(0, maxRows / 4);
   }
   get count(): number {
     return this.t.length;

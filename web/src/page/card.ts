@@ -4,7 +4,7 @@ import {button, el} from '../core/dom';
 import type {Figure, View} from '../core/figure';
 import type {Selection} from '../core/selection';
 import {tableMarkup} from './tables';
-import {savePicture} from './picture_file';
+import {saveImage} from './image_file';
 
 export interface Card {
   figure: Figure;
@@ -31,7 +31,7 @@ export function makeCard(figure: Figure, doc: Doc, selection: Selection, host: H
     el('span', {class: 'tools'},
       view.tables.length > 0 ? button('▤', 'The table behind this figure (t)', () => toggleTable(card)) : null,
       button('⛶', 'Full window (f)', () => toggleFull(card)),
-      button('⤓', 'Save as PNG (s)', () => savePicture(card, doc))),
+      button('⤓', 'Save as PNG (s)', () => saveImage(card, doc))),
     note ? el('span', {class: 'note'}, note) : null));
   if (view.good) section.append(el('p', {class: 'good'}, view.good));
   return card;

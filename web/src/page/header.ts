@@ -43,7 +43,7 @@ function targetOf(name: string, figure: string, ids: Set<string>, command: strin
   return [...candidates, 'checks'].find((id) => ids.has(id)) ?? null;
 }
 
-const mostInWords = 4;
+const maxInWords = 4;
 
 function checkItem(check: Check, doc: Doc, ids: Set<string>, isInWords: boolean): HTMLElement {
   const look = lookOf(check.state), target = targetOf(check.name, check.figure, ids, doc.command);
@@ -58,7 +58,7 @@ function checksOf(doc: Doc, ids: Set<string>): HTMLElement | null {
   const loud = doc.checks.filter((check) => check.state !== 'good'), quiet = doc.checks.filter((check) => check.state === 'good');
   loud.sort((a, b) => Number(b.state === doc.state) - Number(a.state === doc.state));
   return el('ul', {class: 'checks', 'aria-label': 'checks'},
-    ...loud.map((check, i) => checkItem(check, doc, ids, i < mostInWords && check.text.length <= 160)), ...quiet.map((check) => checkItem(check, doc, ids, loud.length === 0 && quiet.length <= 3 && check.text.length <= 70)));
+    ...loud.map((check, i) => checkItem(check, doc, ids, i < maxInWords && check.text.length <= 160)), ...quiet.map((check) => checkItem(check, doc, ids, loud.length === 0 && quiet.length <= 3 && check.text.length <= 70)));
 }
 
 /** `like this` as code. */

@@ -7,7 +7,7 @@ import {seriesPlots} from '../core/series';
 import {tipWords} from '../core/tip';
 import {views3} from '../core/view3';
 import {toggleFull, toggleTable, type Card} from './card';
-import {savePicture} from './picture_file';
+import {saveImage} from './image_file';
 import type {Doc} from '../core/document';
 
 export type KeyHelp = [string, string][];
@@ -68,7 +68,7 @@ export function listenToKeys(doc: Doc, selection: Selection, cards: Card[], sign
     '0': resetAll, d: toggleTheme, '?': () => showHelp(),
     f: () => active && toggleFull(active),
     t: () => active && toggleTable(active),
-    s: () => active && savePicture(active, doc),
+    s: () => active && saveImage(active, doc),
     ...more,
     c: () => void navigator.clipboard?.writeText(tipWords()).catch(() => undefined),
     // By hand: what prevents the key from scrolling also keeps the browser from closing the dialog.

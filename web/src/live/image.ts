@@ -1,4 +1,4 @@
-// What a head's camera sees: its newest picture, where there is one, and the marks over it.
+// What a head's camera sees: its newest image, where there is one, and the marks over it.
 import {Chart, type Pen} from '../core/chart';
 import type {Message} from './connection';
 import type {Calibration} from './space';
@@ -11,7 +11,7 @@ interface Marks {
 }
 const css = (c: Rgba) => `rgba(${Math.round(255 * c.r)},${Math.round(255 * c.g)},${Math.round(255 * c.b)},${c.a})`;
 
-export class LivePicture {
+export class LiveImage {
   private readonly chart: Chart;
   private marks: Marks | null = null;
   private image: ImageBitmap | null = null;

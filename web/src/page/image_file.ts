@@ -25,7 +25,7 @@ function drawTexts(g: CanvasRenderingContext2D, section: HTMLElement, left: numb
   }
 }
 
-export function savePicture(card: Card, doc: Doc): void {
+export function saveImage(card: Card, doc: Doc): void {
   for (const view of views3) if (card.section.contains(view.chart.box)) view.wake();
   for (const chart of charts) if (card.section.contains(chart.box)) chart.redrawFor(2);
   const box = card.section.getBoundingClientRect(), canvas = document.createElement('canvas'), foot = 22;

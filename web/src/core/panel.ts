@@ -7,7 +7,7 @@ import {num} from './format';
 import {scale, type Scale} from './scale';
 import {roundDown125} from './stats';
 
-/** A picture on paper; pixel (0, 0) is the centre of its first pixel. */
+/** A image on paper; pixel (0, 0) is the centre of its first pixel. */
 export interface Panel {
   x: number; y: number; w: number; h: number;
   perPixel: number;

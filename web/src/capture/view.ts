@@ -1,4 +1,4 @@
-// The camera's picture with what is found on it and the outline to fill.
+// The camera's image with what is found on it and the outline to fill.
 import {palette} from '../core/colours';
 import {el} from '../core/dom';
 import type {Look, State} from './messages';
@@ -7,7 +7,7 @@ const flash_ms = 350;
 
 export class CameraView {
   readonly element: HTMLElement;
-  /** The browser's camera, or a canvas for pictures from elsewhere. */
+  /** The browser's camera, or a canvas for images from elsewhere. */
   readonly video: HTMLVideoElement | null;
   private readonly still: HTMLCanvasElement | null;
   private readonly over = el('canvas', {class: 'capture-over', 'aria-hidden': 'true'});
@@ -23,7 +23,7 @@ export class CameraView {
     this.video = hasVideo ? el('video', {id: 'camera', muted: true, playsinline: true, 'aria-label': 'the camera’s image'}) : null;
     this.still = hasVideo ? null : el('canvas', {id: 'camera', role: 'img', 'aria-label': 'the camera’s image'});
     if (this.video) this.video.muted = true;
-    this.element = el('div', {class: 'capture-picture'}, this.video ?? this.still!, this.over, this.words);
+    this.element = el('div', {class: 'capture-image'}, this.video ?? this.still!, this.over, this.words);
     new ResizeObserver(() => this.draw()).observe(this.element);
   }
   say(words: string): void {
@@ -83,7 +83,7 @@ export class CameraView {
       g.strokeRect(7, 7, w - 14, h - 14);
     }
   }
-  /** White under colour: seen on any picture. */
+  /** White under colour: seen on any image. */
   private drawOutline(g: CanvasRenderingContext2D, x: (u: number) => number, y: (v: number) => number): void {
     const outline = this.state?.next?.outline ?? [];
     if (outline.length < 6) return;

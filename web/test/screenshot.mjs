@@ -1,4 +1,4 @@
-// A report as a browser shows it, 3-D figures too, for the docs: node picture.mjs REPORT.html OUT.png WIDTHxHEIGHT SCALE
+// A report as a browser shows it, 3-D figures too, for the docs: node screenshot.mjs REPORT.html OUT.png WIDTHxHEIGHT SCALE
 import {resolve} from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {launch, settled} from './page.mjs';

@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <opencv2/core.hpp>
 #include <thread>
 #include <utility>
@@ -265,10 +264,10 @@ ExitCode calibrate_live(
     seen = work->last_words();
   }
   const std::filesystem::path photos = session.kept().folder();
-  if (interrupting_signal() == SIGTERM || interrupting_signal() == SIGHUP) throw Interrupted();
+  const std::vector<live::KeptPhoto>& kept = session.kept().photos();
+  throw_if_terminated(session.kept());
   forget_interrupt();
   run.lap("capture");
-  const std::vector<live::KeptPhoto>& kept = session.kept().photos();
   const auto num_inexact = static_cast<std::size_t>(std::ranges::count(kept, false, &live::KeptPhoto::is_exact));
   const ExitCode code = kept.empty() ? finish_empty(board, args, seen, run) : finish(photos, num_inexact);
   if (page) page->show_result(code);

@@ -1,8 +1,11 @@
 #include "cli/commands/guide_page.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -252,6 +255,14 @@ void GuidePage::show_result(ExitCode code) {
   tell(dumped({{"op", "ended"}, {"exit_code", static_cast<int>(code)}, {"report", !state.report.empty()}}), "ended");
   constexpr double max_s = 8.0;  // for a browser on a busy machine to fetch the report
   state.server->finish(max_s);
+}
+
+void throw_if_terminated(const live::KeptPhotos& kept) {
+  if (interrupting_signal() != SIGTERM && interrupting_signal() != SIGHUP) return;
+  if (kept.photos().empty()) throw Interrupted();
+  const std::string folder = kept.folder().parent_path().string();
+  throw Interrupted(fmt::format("interrupted; {} photos are in {}: go on with --resume {}", kept.photos().size(),
+                                kept.folder().string(), folder));
 }
 
 }  // namespace alidade::cli

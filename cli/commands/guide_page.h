@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/live/capture/capture_server.h"
+#include "alidade/live/capture/kept_photos.h"
 #include "cli/app/live.h"
 #include "cli/app/run.h"
 
@@ -92,5 +93,9 @@ class GuidePage {
 
 /// Pixels to a hundredth, u and v alternating: "[1.25,3,…]".
 [[nodiscard]] std::string flat_pixels(const std::vector<Eigen::Vector2d>& pixels);
+
+/// Throws Interrupted after a signal that asks the process to end (not after Ctrl-C, which ends the capture): photos
+/// that stand on the disk are named.
+void throw_if_terminated(const live::KeptPhotos& kept);
 
 }  // namespace alidade::cli

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <csignal>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
@@ -174,7 +173,7 @@ ExitCode rangefinder_live(const Camera& camera, const RangefinderConfig& config,
   ShotsWork work(camera, *config.board, session, args.until_mm);
   GuidePage page(args.live, std::move(source), work, run);
   page.guide();
-  if (interrupting_signal() == SIGTERM || interrupting_signal() == SIGHUP) throw Interrupted();
+  throw_if_terminated(session.kept());
   forget_interrupt();
   run.lap("shots");
   if (session.state().shots == 0) throw InputError("no shot was taken: there is nothing to calibrate");

@@ -61,6 +61,9 @@ double share_below(const PixelGrid& sigma, double limit_px) {
   return 100.0 * static_cast<double>(below) / static_cast<double>(std::max<std::size_t>(1, sigma.values.size()));
 }
 
+/// A share in words: 100 only where it is all of it.
+std::string percent(double share) { return two(share < 100.0 && share > 99.0 ? 99.0 : share); }
+
 Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
   constexpr double wanted_px = 1.0;
   const Worst worst = worst_of(study.sigma_infinity);
@@ -73,7 +76,7 @@ Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
   const double useless_px = 0.01 * std::max(report.camera.width_px, report.camera.height_px);
   const bool is_answer = share_below(study.sigma_infinity, useless_px) >= 50.0;
   check.state = check.value >= 95.0 ? State::good : is_answer ? State::care : State::bad;
-  check.text = "3σ is below 1 px in " + two(check.value) + " % of the image; worst " + two(3.0 * worst.value) +
+  check.text = "3σ is below 1 px in " + percent(check.value) + " % of the image; worst " + two(3.0 * worst.value) +
                " px, " + place(worst.px, report.camera);
   return check;
 }
@@ -296,7 +299,8 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
   for (const Check& check : verdict.checks) {  // halves that differ are a symptom of it
     if (check.name == "board flat" && check.state == State::care && study.transfer) worst = &check;
   }
-  const std::string trust = "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, 0.5)) + " % of the image";
+  const std::string trust =
+      "3σ is below 0.5 px in " + percent(share_below(study.sigma_infinity, 0.5)) + " % of the image";
   const std::string word = verdict.state == State::good   ? "Good: "
                            : verdict.state == State::care ? "Usable with care: "
                                                           : "Not to be trusted: ";

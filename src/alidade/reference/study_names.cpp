@@ -57,6 +57,7 @@ second_tau_s            s      second lag, of the command
 clock_rate              1      by which a second of the angles' clock is longer than one of the commands'
 evidence.*              1      of each of these: 2 ln of the likelihood ratio for it
 encoder_step_rad        rad    one count
+encoder_hz              Hz     how often it is sampled, where its angle is held for several rows; 0: not seen
 sigma_time_s            s      by which the rows' times err, where the residuals show it; else 0
 design_effect           1      how much less the rows determine than if each erred by itself
 correlated_rows         count  how long errors last

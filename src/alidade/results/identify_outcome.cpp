@@ -43,6 +43,7 @@ void fill_flaws(const Identification& identified, ResultDocument& document) {
     document.estimate["evidence"][servo_flaw_names[flaw]] = fit.flaw_evidence[flaw];
   }
   document.estimate["encoder_step_rad"] = identified.encoder_step_rad;
+  document.estimate["encoder_hz"] = identified.encoder_hz;
   document.estimate["sigma_time_s"] = identified.sigma_time_s;
 }
 
@@ -93,6 +94,8 @@ void append_plant_lines(const ServoIdentification& identified, std::vector<std::
   for (const std::size_t flaw : fit.freed)
     lines.push_back(fmt::format("{} {:.6g} ± {:.2g} {}", servo_flaw_words[flaw], fit.flaws.*servo_flaws[flaw],
                                 3.0 * fit.flaw_sigma[flaw], servo_flaw_units[flaw]));
+  if (identified.encoder_hz > 0.0)
+    lines.push_back(fmt::format("encoder   sampled {:.4g} times a second", identified.encoder_hz));
   lines.push_back(fmt::format("residuals {:.3g}° RMS, correlation {:.2f}; as {} plant {:.3g}°", fit.rms_rad * deg,
                               identified.lag_one_correlation, is_angle ? "a rate" : "an angle",
                               identified.other.rms_rad * deg));

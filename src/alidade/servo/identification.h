@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -20,7 +21,11 @@ struct ServoSample {
   double t_s = 0.0, command = 0.0, angle_rad = 0.0;
   /// When the command was given, if earlier than the angle was read, not before the row before it; NaN: at t_s.
   double command_t_s = std::numeric_limits<double>::quiet_NaN();
+  /// Of an encoder that holds its angle for several rows, estimated by identify(): half a period after the sample was
+  /// taken that the angle repeats. The first row of a sample counts. NaN: at t_s.
+  double sampled_t_s = std::numeric_limits<double>::quiet_NaN();
 
+  [[nodiscard]] double read_s() const { return std::isfinite(sampled_t_s) ? sampled_t_s : t_s; }
   [[nodiscard]] double given_s() const { return command_t_s <= t_s ? command_t_s : t_s; }
 };
 
@@ -105,6 +110,8 @@ struct ServoIdentification {
   std::vector<CountedFlaw> counted;  ///< In the fit's covariance.
   double sigma_time_s = 0.0;         ///< By which the rows' times err, where the residuals show it; in the covariance.
   double sigma_time_score = 0.0;     ///< Of it, in σ.
+  double encoder_hz = 0.0;           ///< It is sampled so often and held between: half a period is in the latency.
+  std::vector<double> sampled_t_s;   ///< Of each row, then.
   double lag_one_correlation = 0.0;  ///< Of the residuals, one row to the next: near 0 where the model is enough.
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };

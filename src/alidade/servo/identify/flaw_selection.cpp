@@ -36,8 +36,8 @@ double lasting_rate(std::span<const ServoSample> log) {
   constexpr double min_s = 0.15;
   double most = 0.0;
   for (std::size_t i = 0, j = 0; j < log.size(); ++j) {
-    while (i + 1 < j && log[j].t_s - log[i + 1].t_s >= min_s) ++i;
-    const double dt = log[j].t_s - log[i].t_s;
+    while (i + 1 < j && log[j].read_s() - log[i + 1].read_s() >= min_s) ++i;
+    const double dt = log[j].read_s() - log[i].read_s();
     if (j > i && dt >= min_s) most = std::max(most, std::abs(log[j].angle_rad - log[i].angle_rad) / dt);
   }
   return most;

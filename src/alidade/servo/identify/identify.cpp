@@ -15,6 +15,7 @@
 #include "alidade/servo/identify/levenberg.h"
 #include "alidade/servo/identify/log_times.h"
 #include "alidade/servo/identify/ordinary_flaws.h"
+#include "alidade/servo/identify/sampled_log.h"
 
 namespace alidade {
 namespace {
@@ -96,12 +97,6 @@ LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double ta
   return fit;
 }
 
-Eigen::VectorXd readings_of(std::span<const ServoSample> log) {
-  Eigen::VectorXd readings(static_cast<Eigen::Index>(log.size()));
-  for (std::size_t i = 0; i < log.size(); ++i) readings[static_cast<Eigen::Index>(i)] = log[i].angle_rad;
-  return readings;
-}
-
 /// Every n-th row, so that a search over a long log stays short; commands between are piecewise constant.
 std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
   constexpr std::size_t most = 1500;
@@ -144,7 +139,7 @@ std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J) {
 /// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
 ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params) {
   const Eigen::VectorXd readings = readings_of(log);
-  const double dof = static_cast<double>(log.size()) - num_servo_params;
+  const double dof = static_cast<double>(readings.size()) - num_servo_params;
   // 5 to 15 steps are typical; a kink at a sampled latency takes more
   const LevenbergOutcome descent = levenberg(
       {.max_steps = 60, .first_damping = 1e-6, .tolerance = 1e-12}, params,
@@ -211,7 +206,8 @@ std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const
 }  // namespace
 
 ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
-  const auto num_rows = static_cast<Eigen::Index>(log.size());
+  const std::vector<double> times_s = reading_times(log);
+  const auto num_rows = static_cast<Eigen::Index>(times_s.size());
   ServoResponse response{Eigen::VectorXd(num_rows), decltype(response.J)(num_rows, num_servo_params)};
   Walk walk{kind, params[ServoParam::gain], params[ServoParam::tau]};
   if (kind == ServoKind::angle) {
@@ -221,10 +217,10 @@ ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, c
     walk.v = params[ServoParam::start];
     walk.dv[ServoParam::start] = 1.0;
   }
-  double now_s = log.front().t_s, command = log.front().command;
+  double now_s = std::min(log.front().t_s, times_s.front()), command = log.front().command;
   std::size_t next = 1;  // the first command has been there before
   for (Eigen::Index i = 0; i < num_rows; ++i) {
-    const double t_s = log[static_cast<std::size_t>(i)].t_s;
+    const double t_s = times_s[static_cast<std::size_t>(i)];
     for (; next < log.size() && log[next].given_s() + params[ServoParam::latency] <= t_s; ++next) {
       if (log[next].command == command) continue;
       const double switch_s = log[next].given_s() + params[ServoParam::latency];
@@ -251,6 +247,15 @@ std::size_t believed_of(const std::array<ServoFit, 2>& fits, ServoKindRule rule)
   return rule == ServoKindRule::rate ? 1 : 0;
 }
 
+/// Of readings as of rows, and the latency that their phase leaves open.
+void count_by_row(std::span<const ServoSample> log, double sigma_phase_s, ServoIdentification& result) {
+  const auto readings = static_cast<double>(result.residual_rad.size()), rows = static_cast<double>(log.size());
+  result.correlated_rows =
+      static_cast<std::size_t>(std::ceil(static_cast<double>(result.correlated_rows) * rows / readings));
+  result.residual_rad = by_row(log, result.residual_rad);
+  result.fit.cov(ServoParam::latency, ServoParam::latency) += sigma_phase_s * sigma_phase_s;
+}
+
 ServoIdentification::Status status_of(const ServoFit& fit) {
   if (!fit.is_observable) return ServoIdentification::Status::degenerate;
   return fit.has_converged ? ServoIdentification::Status::converged : ServoIdentification::Status::not_converged;
@@ -258,14 +263,20 @@ ServoIdentification::Status status_of(const ServoFit& fit) {
 
 }  // namespace
 
-ServoIdentification identify_servo(std::span<const ServoSample> log, ServoKindRule rule) {
+ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKindRule rule) {
   ServoIdentification result;
-  const auto [low, high] = std::ranges::minmax_element(log, {}, &ServoSample::command);
-  const auto [lowest, highest] = std::ranges::minmax_element(log, {}, &ServoSample::angle_rad);
+  const auto [low, high] = std::ranges::minmax_element(as_read, {}, &ServoSample::command);
+  const auto [lowest, highest] = std::ranges::minmax_element(as_read, {}, &ServoSample::angle_rad);
   result.command_range = high->command - low->command;
   result.angle_range_rad = highest->angle_rad - lowest->angle_rad;
-  result.duration_s = log.back().t_s - log.front().t_s;
+  result.duration_s = as_read.back().t_s - as_read.front().t_s;
   if (!(result.command_range > 0.0)) return result;
+  const std::optional<HeldSampling> held = held_sampling(as_read);
+  if (held) {
+    result.encoder_hz = 1.0 / held->sampling.period_s;
+    result.sampled_t_s = sampled_times(as_read, held->sampling);
+  }
+  const std::vector<ServoSample> log = sampled_log(as_read, result.sampled_t_s);
   std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle)),
                                refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
   std::array<std::vector<ServoRival>, 2> rivals;
@@ -287,6 +298,7 @@ ServoIdentification identify_servo(std::span<const ServoSample> log, ServoKindRu
   result.lag_one_correlation = lag_one(result.residual_rad);
   constexpr std::size_t several = 2;
   if (num_sizes(log, several) < several && result.fit.is_observable) result.hidden = hidden_flaws(log, result.fit);
+  if (held) count_by_row(log, held->sigma_phase_s, result);
   return result;
 }
 

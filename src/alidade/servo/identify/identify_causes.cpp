@@ -13,7 +13,8 @@ std::vector<ServoCause> servo_causes(std::span<const ServoSample> log, const Ser
   std::vector<ServoCause> causes;
   if (!fit.is_observable || identified.residual_rad.empty()) return causes;
   const FlawGround ground = flaw_ground(log, fit);
-  const double dof = static_cast<double>(log.size()) - num_servo_params - static_cast<double>(fit.freed.size()) - 1.0;
+  const double dof =
+      static_cast<double>(ground.misfit.size()) - num_servo_params - static_cast<double>(fit.freed.size()) - 1.0;
   const double sum2 = ground.misfit.squaredNorm();
   for (std::size_t flaw = 0; flaw < num_servo_flaws; ++flaw) {
     if (std::ranges::count(fit.freed, flaw) > 0) continue;

@@ -8,6 +8,7 @@
 #include "alidade/pantilt/positioner.h"
 #include "alidade/pantilt/servo_plant.h"
 #include "alidade/servo/identify/levenberg.h"
+#include "alidade/servo/identify/sampled_log.h"
 
 namespace alidade {
 namespace {
@@ -133,7 +134,7 @@ double step_of(std::span<const ServoSample> log, const ServoFit& fit, Index para
 /// ∂ / ∂ (parameters, freed flaws in units of their own).
 Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const ServoFit& fit) {
   const auto num = static_cast<Index>(num_servo_params + fit.freed.size());
-  Eigen::MatrixXd J(static_cast<Index>(log.size()), num);
+  Eigen::MatrixXd J(readings_of(log).size(), num);
   for (Index k = 0; k < num; ++k) {
     const double step = step_of(log, fit, k);
     const bool is_at_edge = k == ServoParam::latency && fit.params[ServoParam::latency] < step;
@@ -151,10 +152,11 @@ double max_command(std::span<const ServoSample> log) {
 }
 
 double max_rate(std::span<const ServoSample> log, const Eigen::VectorXd& response) {
+  const std::vector<double> times_s = reading_times(log);
   double most = 0.0;
-  for (std::size_t i = 1; i < log.size(); ++i) {
+  for (std::size_t i = 1; i < times_s.size(); ++i) {
     const auto at = static_cast<Index>(i);
-    most = std::max(most, std::abs(response[at] - response[at - 1]) / (log[i].t_s - log[i - 1].t_s));
+    most = std::max(most, std::abs(response[at] - response[at - 1]) / (times_s[i] - times_s[i - 1]));
   }
   return most;
 }
@@ -185,12 +187,14 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
 }  // namespace
 
 Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit& fit, const ServoFlaws& flaws) {
-  Eigen::VectorXd angles(static_cast<Index>(log.size()));
+  const std::vector<double> times_s = reading_times(log);
+  const double begin_s = std::min(log.front().t_s, times_s.front());
+  Eigen::VectorXd angles(static_cast<Index>(times_s.size()));
   FlawedServo servo(fit, flaws, log.front().command);
-  double now_s = log.front().t_s, command = log.front().command;
+  double now_s = begin_s, command = log.front().command;
   std::size_t next = 1;
-  for (std::size_t i = 0; i < log.size(); ++i) {
-    const double read_s = log[i].t_s + flaws.clock_rate * (log[i].t_s - log.front().t_s);
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    const double read_s = times_s[i] + flaws.clock_rate * (times_s[i] - begin_s);
     for (; next < log.size() && log[next].given_s() + fit.params[ServoParam::latency] <= read_s; ++next) {
       if (log[next].command == command) continue;
       servo.advance(log[next].given_s() + fit.params[ServoParam::latency] - now_s, command);
@@ -205,9 +209,7 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
 }
 
 Eigen::VectorXd flawed_misfit(std::span<const ServoSample> log, const ServoFit& fit) {
-  Eigen::VectorXd misfit = flawed_response(log, fit, fit.flaws);
-  for (std::size_t i = 0; i < log.size(); ++i) misfit[static_cast<Index>(i)] -= log[i].angle_rad;
-  return misfit;
+  return flawed_response(log, fit, fit.flaws) - readings_of(log);
 }
 
 double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& fit) {
@@ -221,7 +223,8 @@ double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& 
       [&](const ServoFit& at) { return flawed_misfit(log, at); },
       [&](const ServoFit& at) { return jacobian_by_factors(log, at); }, after);
   fit.has_converged = descent.has_converged;
-  const double dof = static_cast<double>(log.size()) - num_servo_params - static_cast<double>(fit.freed.size());
+  const double dof =
+      static_cast<double>(readings_of(log).size()) - num_servo_params - static_cast<double>(fit.freed.size());
   fit.rms_rad = std::sqrt(descent.sum2 / std::max(1.0, dof));
   return descent.sum2;
 }

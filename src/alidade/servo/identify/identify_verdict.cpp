@@ -6,6 +6,7 @@
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/log_times.h"
+#include "alidade/servo/identify/sampled_log.h"
 
 namespace alidade {
 namespace {
@@ -21,7 +22,7 @@ Verdict refused(std::string what, std::string add) {
 
 void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
-  const double correlation = identified.lag_one_correlation, rows = static_cast<double>(log.size());
+  const double correlation = identified.lag_one_correlation, rows = static_cast<double>(reading_times(log).size());
   // Of white residuals the correlation has σ = 1/√n; 0.3 is where structure costs more than noise.
   const double limit = std::max(0.3, 4.0 / std::sqrt(rows));
   const bool is_white = std::abs(correlation) < limit;
@@ -42,6 +43,12 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
                             is_resolved ? "rows are close enough for the time constant"
                                         : "rows are further apart than twice the time constant: log faster",
                             fit.params[1] / step_s, 0.5, "rows", ""});
+  if (identified.encoder_hz > 0.0)
+    verdict.checks.push_back({"encoder", State::good,
+                              "the encoder is sampled " + text_of(identified.encoder_hz, 3) +
+                                  " times a second: each sample counts once, and the latency includes half of the time "
+                                  "between two",
+                              identified.encoder_hz, 0.0, "Hz", ""});
   if (!fit.has_converged)
     verdict.checks.push_back({"convergence", State::care, "the fit was still moving", 0.0, 0.0, "1", ""});
 }
@@ -146,9 +153,7 @@ void add_readings(std::span<const ServoSample> log, const ServoIdentification& i
                               step_rad, 2.0 * identified.fit.rms_rad, "rad", ""});
 }
 
-}  // namespace
-
-Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified) {
+Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& identified) {
   const std::string excite = "log a step or a chirp of the command that moves the axis by degrees";
   if (log.size() < 20)
     return refused("only " + std::to_string(log.size()) + " rows: too few for five parameters", "log at least 20 rows");
@@ -190,6 +195,12 @@ Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentifica
     verdict.state = State::care;
   }
   return verdict;
+}
+
+}  // namespace
+
+Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified) {
+  return verdict_of(sampled_log(log, identified.sampled_t_s), identified);
 }
 
 }  // namespace alidade

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/servo/identify/identify_flaws.h"
+#include "alidade/servo/identify/sampled_log.h"
 
 namespace alidade {
 namespace {
@@ -31,10 +32,11 @@ TimeVariance time_variance(const ServoIdentification& result, const Eigen::Vecto
 
 /// ∂ rate / ∂ t.
 Eigen::VectorXd slope_of(std::span<const ServoSample> log, const Eigen::VectorXd& rate) {
+  const std::vector<double> times_s = reading_times(log);
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(rate.size());
   for (Index i = 1; i + 1 < rate.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
-    slope[i] = (rate[i + 1] - rate[i - 1]) / (log[at + 1].t_s - log[at - 1].t_s);
+    slope[i] = (rate[i + 1] - rate[i - 1]) / (times_s[at + 1] - times_s[at - 1]);
   }
   return slope;
 }

@@ -106,7 +106,8 @@ std::vector<double> errors_of(const Identification& found, const HeldAxis& axis)
   return errors;
 }
 
-/// Without it a 20 Hz encoder in a log of 100 to 200 rows a second made accelerations 7 and 21 % wrong at a good verdict.
+/// Without it a 20 Hz encoder in a log of 100 to 200 rows a second made accelerations 7 and 21 % wrong at a good
+/// verdict.
 TEST(SampledLog, AxesAreIdentifiedThroughASlowEncoder) {
   const int draws_of_each = testing::trials(5);
   int good = 0, runs = 0;

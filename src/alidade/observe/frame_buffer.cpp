@@ -130,6 +130,29 @@ double sigma_by_squares(const BundleSolution& solution) {
   return solution.rms_px * std::sqrt(count / std::max(solution.dof, 1));
 }
 
+/// From the solution so far: without what does not belong, then with the noise that the rest shows.
+void solve_again(const AdjustConfig& config, const Progress& progress, RotationBundleConfig& solve,
+                 Adjustment& adjustment) {
+  RotationBundle& bundle = adjustment.bundle;
+  const bool sigma_is_known = config.sigma_px > 0.0;
+  for (int round = 0; round < 2 && adjustment.has_value; ++round) {
+    const BundleSolution& so_far = adjustment.solution;
+    constexpr double min_sigma = 2e-5;  // about 0.01 px: no tracker is better, and rates are sampled
+    const double robust = robust_sigma(so_far.residual_px, so_far.dof);
+    const double given = std::max(round == 0 ? robust : sigma_by_squares(so_far), min_sigma);
+    if (!sigma_is_known) solve.sigma_px = given;
+    if (config.reject && round == 0) {
+      adjustment.num_rejected = reject_far(bundle, so_far, std::max(given, solve.sigma_px));
+    }
+    bundle.camera = so_far.camera;
+    bundle.points = so_far.points;
+    BundleSolution again = solve_rotation_bundle(
+        bundle, config.prior ? config.prior->about(so_far.camera) : CommonPrior(so_far.camera), solve, progress);
+    adjustment.has_value = again.converged && std::isfinite(again.rms_px);
+    adjustment.solution = std::move(again);
+  }
+}
+
 }  // namespace
 
 Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const Progress& progress) {
@@ -160,23 +183,7 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   attempt(config.start);
   for (const double focal : config.other_starts) attempt(with_focal(config.start, focal));
 
-  // Again from there: without what does not belong, then with the noise that the rest shows.
-  for (int round = 0; round < 2 && adjustment.has_value; ++round) {
-    const BundleSolution& so_far = adjustment.solution;
-    constexpr double min_sigma = 2e-5;  // about 0.01 px: no tracker is better, and rates are sampled
-    const double robust = robust_sigma(so_far.residual_px, so_far.dof);
-    const double given = std::max(round == 0 ? robust : sigma_by_squares(so_far), min_sigma);
-    if (!sigma_is_known) solve.sigma_px = given;
-    if (config.reject && round == 0) {
-      adjustment.num_rejected = reject_far(bundle, so_far, std::max(given, solve.sigma_px));
-    }
-    bundle.camera = so_far.camera;
-    bundle.points = so_far.points;
-    BundleSolution again = solve_rotation_bundle(
-        bundle, config.prior ? config.prior->about(so_far.camera) : CommonPrior(so_far.camera), solve, progress);
-    adjustment.has_value = again.converged && std::isfinite(again.rms_px);
-    adjustment.solution = std::move(again);
-  }
+  solve_again(config, progress, solve, adjustment);
   adjustment.sigma_px = solve.sigma_px;
   return adjustment;
 }

@@ -1,5 +1,4 @@
 #include "alidade/results/batch_outcome.h"
-#include "alidade/estimation/median.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "alidade/estimation/median.h"
 #include "alidade/files/csv.h"
 
 namespace alidade {
@@ -130,6 +130,40 @@ DataTable lot_table(const std::vector<BatchRow>& rows) {
           {{"quantity", names}, {"rows", counts}, {"median", medians}, {"scatter", scatters}, {"sigma", sigmas}}};
 }
 
+constexpr std::size_t max_lines = 10;
+
+void add_failures(const std::vector<BatchRow>& rows, std::vector<std::string>& lines) {
+  std::size_t failures = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (is_estimate(rows[i].exit_code) || ++failures > max_lines) continue;
+    lines.push_back(
+        fmt::format("row {} ({}): exit code {}: {}", i + 1, rows[i].camera, rows[i].exit_code, rows[i].sentence));
+  }
+  if (failures > max_lines) lines.push_back(fmt::format("… and {} more without an estimate", failures - max_lines));
+}
+
+void add_outliers(const std::vector<BatchRow>& rows, const std::vector<BatchOutlier>& outliers,
+                  std::vector<std::string>& lines) {
+  for (std::size_t i = 0; i < std::min(outliers.size(), max_lines); ++i)
+    lines.push_back(fmt::format("outlier: {}  {} = {:.6g} ± {:.2g}, the lot's median {:.6g} (z {:.1f})",
+                                rows[outliers[i].row].camera, outliers[i].name, outliers[i].value, outliers[i].sigma,
+                                outliers[i].median, outliers[i].z));
+}
+
+Verdict batch_verdict(std::size_t rows, std::size_t answered, std::size_t outliers) {
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} of {} rows have an estimate; {} outliers in the lot", answered, rows, outliers);
+  if (answered < rows || outliers > 0) {
+    verdict.state = State::care;
+    verdict.to_add = "look at them in batch.csv";
+  }
+  if (answered == 0) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::undetermined;
+  }
+  return verdict;
+}
+
 }  // namespace
 
 void read_result(std::string_view result_json, const std::string& file, BatchRow& row) {
@@ -229,11 +263,9 @@ JobOutcome outcome_of(const std::vector<BatchRow>& rows) {
   JobOutcome outcome;
   ResultDocument& document = outcome.document;
   std::map<std::string, std::size_t> states;
-  std::size_t answered = 0;
-  for (const BatchRow& row : rows) {
-    ++states[row.state];
-    answered += is_estimate(row.exit_code) ? 1 : 0;
-  }
+  for (const BatchRow& row : rows) ++states[row.state];
+  const auto answered = static_cast<std::size_t>(
+      std::ranges::count_if(rows, [](const BatchRow& row) { return is_estimate(row.exit_code); }));
   const std::vector<BatchOutlier> outliers = outliers_of(rows);
   document.counts.given = rows.size();
   document.counts.used = answered;
@@ -247,30 +279,9 @@ JobOutcome outcome_of(const std::vector<BatchRow>& rows) {
   outcome.files.push_back({"batch.csv", batch_csv(rows)});
   for (const auto& [state, count] : states)
     outcome.lines.push_back(fmt::format("{:<14} {} {}", state, count, count == 1 ? "row" : "rows"));
-  constexpr std::size_t max_lines = 10;
-  std::size_t failures = 0;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (is_estimate(rows[i].exit_code) || ++failures > max_lines) continue;
-    outcome.lines.push_back(
-        fmt::format("row {} ({}): exit code {}: {}", i + 1, rows[i].camera, rows[i].exit_code, rows[i].sentence));
-  }
-  if (failures > max_lines)
-    outcome.lines.push_back(fmt::format("… and {} more without an estimate", failures - max_lines));
-  for (std::size_t i = 0; i < std::min(outliers.size(), max_lines); ++i)
-    outcome.lines.push_back(fmt::format("outlier: {}  {} = {:.6g} ± {:.2g}, the lot's median {:.6g} (z {:.1f})",
-                                        rows[outliers[i].row].camera, outliers[i].name, outliers[i].value,
-                                        outliers[i].sigma, outliers[i].median, outliers[i].z));
-  Verdict& verdict = document.verdict;
-  verdict.sentence =
-      fmt::format("{} of {} rows have an estimate; {} outliers in the lot", answered, rows.size(), outliers.size());
-  if (answered < rows.size() || !outliers.empty()) {
-    verdict.state = State::care;
-    verdict.to_add = "look at them in batch.csv";
-  }
-  if (answered == 0) {
-    verdict.state = State::refused;
-    verdict.exit_code = ExitCode::undetermined;
-  }
+  add_failures(rows, outcome.lines);
+  add_outliers(rows, outliers, outcome.lines);
+  document.verdict = batch_verdict(rows.size(), answered, outliers.size());
   return outcome;
 }
 

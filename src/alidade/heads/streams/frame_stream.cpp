@@ -114,6 +114,32 @@ std::vector<double> numbers_in(const std::string& text, const char* separators) 
   return numbers;
 }
 
+/// The words of a value, as "size=320x240", into the camera: false where there is no such.
+bool take_shape(const std::string& key, const std::vector<double>& n, SimulatedCamera& camera) {
+  const auto is_within = [](double value, double low, double high) { return value >= low && value <= high; };
+  if (key == "size" && n.size() == 2 && is_within(n[0], 64, 4096) && is_within(n[1], 64, 4096)) {
+    const double scale = n[0] / camera.width_px;
+    camera.width_px = static_cast<int>(n[0]);
+    camera.height_px = static_cast<int>(n[1]);
+    for (double* each : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *each *= scale;
+  } else if (key == "target" && n.size() == 5) {
+    camera.target_rate_rad_s = n[0] * degree;
+    camera.target_rad = Eigen::Vector2d(n[1], n[2]) * degree;
+    camera.target_span_rad = n[3] * degree;
+    camera.target_radius_rad = n[4] * degree;
+  } else if (key == "board" && n.size() == 6 && is_within(n[0], 3, 40) && is_within(n[1], 3, 40) && n[2] > 0.0 &&
+             n[3] > 0.0) {
+    camera.board = {.cols = static_cast<int>(n[0]), .rows = static_cast<int>(n[1]), .square_m = n[2]};
+    camera.board_m = n[3];
+    camera.board_rad = Eigen::Vector2d(n[4], n[5]) * degree;
+  } else if (key == "mount" && n.size() == 3) {
+    camera.mount_rad = Eigen::Vector3d(n[0], n[1], n[2]) * degree;
+  } else {
+    return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 SimulatedCamera simulated_camera(const std::string& text, const std::string& where) {
@@ -129,34 +155,15 @@ SimulatedCamera simulated_camera(const std::string& text, const std::string& whe
     const std::vector<double> numbers =
         numbers_in(part.size() > key.size() ? part.substr(key.size() + 1) : "", key == "size" ? "x" : ":");
     at = end + 1;
-    if (key == "size" && numbers.size() == 2 && numbers[0] >= 64 && numbers[1] >= 64 && numbers[0] <= 4096 &&
-        numbers[1] <= 4096) {
-      const double scale = numbers[0] / camera.width_px;
-      camera.width_px = static_cast<int>(numbers[0]);
-      camera.height_px = static_cast<int>(numbers[1]);
-      for (double* each : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *each *= scale;
-    } else if (key == "target" && numbers.size() == 5) {
-      camera.target_rate_rad_s = numbers[0] * degree;
-      camera.target_rad = Eigen::Vector2d(numbers[1], numbers[2]) * degree;
-      camera.target_span_rad = numbers[3] * degree;
-      camera.target_radius_rad = numbers[4] * degree;
-    } else if (key == "board" && numbers.size() == 6 && numbers[0] >= 3 && numbers[1] >= 3 && numbers[0] <= 40 &&
-               numbers[1] <= 40 && numbers[2] > 0.0 && numbers[3] > 0.0) {
-      camera.board = {
-          .cols = static_cast<int>(numbers[0]), .rows = static_cast<int>(numbers[1]), .square_m = numbers[2]};
-      camera.board_m = numbers[3];
-      camera.board_rad = Eigen::Vector2d(numbers[4], numbers[5]) * degree;
-    } else if (key == "mount" && numbers.size() == 3) {
-      camera.mount_rad = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]) * degree;
-    } else if (const auto entry = entries.find(key); entry != entries.end() && numbers.size() == 1) {
-      *entry->second = numbers[0];
-    } else {
+    if (take_shape(key, numbers, camera)) continue;
+    const auto entry = entries.find(key);
+    if (entry == entries.end() || numbers.size() != 1)
       throw InputError(
           fmt::format("{}: '{}' is nothing that a simulated camera has; it has size=320x240, fx, fy, cx, "
                       "cy, k1, mount=X:Y:Z, fps, delay, noise, jump, target=RATE:PAN:TILT:SPAN:RADIUS, "
                       "board=COLUMNS:ROWS:SQUARE:DISTANCE:PAN:TILT, seed",
                       where, part));
-    }
+    *entry->second = numbers[0];
   }
   camera.seed = static_cast<std::uint64_t>(std::abs(seed));
   if (!(camera.fx > 10.0 && camera.fy > 10.0 && camera.fps > 0.1 && camera.noise >= 0.0 && camera.noise < 100.0 &&

@@ -14,6 +14,8 @@
 
 namespace alidade {
 
+class WorldRotation;
+
 enum class ObservationOutcome {
   used,
   gated,        ///< Too far from where it was expected.
@@ -121,6 +123,12 @@ class LocalizationFilter {
   [[nodiscard]] int num_lens() const { return static_cast<int>(config_.lens_params.size()); }
   /// Derivatives and innovation at nominal ⊞ delta_. False where it is not seen.
   bool linearise(Measured& measured);
+  struct Moved;
+  [[nodiscard]] Moved moved_by_delta(const Feature& nominal, const WorldRotation& turn);
+  [[nodiscard]] Eigen::Matrix<double, 2, 3> J_px_rotation(const ExpectedView& view, const Feature& nominal,
+                                                          const Moved& moved, const WorldRotation& turn) const;
+  void put_columns(const ExpectedView& view, const Eigen::Matrix<double, 2, 3>& J_rotation, const Moved& moved,
+                   Measured& measured) const;
   void expect(Measured& measured) const;  ///< S and NIS from the current covariance.
   void collect(std::span<const FeatureObservation> observations);
   /// What comes first in an update.

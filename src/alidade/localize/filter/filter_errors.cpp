@@ -14,18 +14,22 @@ double& lens_param(Camera& camera, int index) {
 
 }  // namespace
 
-bool LocalizationFilter::linearise(Measured& measured) {
-  const Eigen::Vector3d phi = delta_.segment<3>(3);
-  Rigid3 world_from_cam = motion_.world_from_cam;
-  const Feature& nominal = *measured.feature;
-  Feature feature = nominal;
-  const WorldRotation turn(world_from_cam, phi);
+/// Where an update's steps have led: a pose and the point that is seen.
+struct LocalizationFilter::Moved {
+  Rigid3 world_from_cam;
+  Feature feature;
+};
+
+/// The camera's lens moves in `camera_at_delta_`.
+LocalizationFilter::Moved LocalizationFilter::moved_by_delta(const Feature& nominal, const WorldRotation& turn) {
+  Moved moved{motion_.world_from_cam, nominal};
+  auto& [world_from_cam, feature] = moved;
   if (turns_world_) {  // the camera keeps its attitude: nothing measured depends on how the world is rotated
     world_from_cam.translation = turn.position_before(world_from_cam.translation, delta_.head<3>());
     feature = turn.feature_before(nominal, error_of(nominal));
   } else {
     world_from_cam.translation += delta_.head<3>();
-    world_from_cam.rotation = (world_from_cam.rotation * exp_so3(phi)).normalized();
+    world_from_cam.rotation = (world_from_cam.rotation * exp_so3(delta_.segment<3>(3))).normalized();
     for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
   }
   if (scale_at_) {  // the second bracket of world_scale.h
@@ -36,24 +40,29 @@ bool LocalizationFilter::linearise(Measured& measured) {
     const int index = config_.lens_params[static_cast<std::size_t>(k)];
     lens_param(camera_at_delta_, index) = lens_param(camera_, index) + delta_[motion_dim + k];
   }
-  const auto view = expected_view(num_lens() ? camera_at_delta_ : camera_, world_from_cam, feature);
-  if (!view) return false;
-  measured.nu = measured.px - view->px;
-  Eigen::Matrix<double, 2, 3> J_rotation;
-  if (turns_world_) {
-    J_rotation = (view->J_px_pose.leftCols<3>() * cross_matrix(motion_.world_from_cam.translation) +
-                  view->J_px_feature * J_before_rotation(nominal)) *
-                 turn.world_from_cam();
-  } else {
-    const Eigen::Matrix3d J = right_jacobian(phi);
-    J_rotation = view->J_px_pose.rightCols<3>() * J;
-    if (config_.holds_frame) {  // by errors counted from where the update began
-      const Eigen::Matrix3d R = turn.world_from_cam(), RJ = R * J.transpose();
-      J_rotation += view->J_px_pose.leftCols<3>() * (cross_matrix(motion_.world_from_cam.translation) * R -
-                                                     cross_matrix(world_from_cam.translation) * RJ);
-      J_rotation += view->J_px_feature * (J_before_rotation(nominal) * R - J_before_rotation(feature) * RJ);
-    }
+  return moved;
+}
+
+Eigen::Matrix<double, 2, 3> LocalizationFilter::J_px_rotation(const ExpectedView& view, const Feature& nominal,
+                                                              const Moved& moved, const WorldRotation& turn) const {
+  const Eigen::Matrix3d p_cross = cross_matrix(motion_.world_from_cam.translation);
+  if (turns_world_)
+    return (view.J_px_pose.leftCols<3>() * p_cross + view.J_px_feature * J_before_rotation(nominal)) *
+           turn.world_from_cam();
+  const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(3));
+  Eigen::Matrix<double, 2, 3> J_rotation = view.J_px_pose.rightCols<3>() * J;
+  if (config_.holds_frame) {  // by errors counted from where the update began
+    const Eigen::Matrix3d R = turn.world_from_cam(), RJ = R * J.transpose();
+    J_rotation += view.J_px_pose.leftCols<3>() * (p_cross * R - cross_matrix(moved.world_from_cam.translation) * RJ);
+    J_rotation += view.J_px_feature * (J_before_rotation(nominal) * R - J_before_rotation(moved.feature) * RJ);
   }
+  return J_rotation;
+}
+
+/// The observation's Jacobian, by the columns that are not zero.
+void LocalizationFilter::put_columns(const ExpectedView& view, const Eigen::Matrix<double, 2, 3>& J_rotation,
+                                     const Moved& moved, Measured& measured) const {
+  const auto& [world_from_cam, feature] = moved;
   int n = 0;
   const auto put = [&](int column, double d0, double d1) {
     const auto at = static_cast<std::size_t>(n++);
@@ -61,22 +70,32 @@ bool LocalizationFilter::linearise(Measured& measured) {
     measured.h0[at] = d0;
     measured.h1[at] = d1;
   };
-  for (int i = 0; i < 3; ++i) put(i, view->J_px_pose(0, i), view->J_px_pose(1, i));
+  for (int i = 0; i < 3; ++i) put(i, view.J_px_pose(0, i), view.J_px_pose(1, i));
   for (int i = 0; i < 3; ++i) put(3 + i, J_rotation(0, i), J_rotation(1, i));
   for (int k = 0; k < num_lens(); ++k) {
     const int index = config_.lens_params[static_cast<std::size_t>(k)];
-    put(motion_dim + k, view->J_px_lens(0, index), view->J_px_lens(1, index));
+    put(motion_dim + k, view.J_px_lens(0, index), view.J_px_lens(1, index));
   }
-  for (int i = 0; i < feature.dim(); ++i) put(feature.offset + i, view->J_px_feature(0, i), view->J_px_feature(1, i));
+  for (int i = 0; i < feature.dim(); ++i) put(feature.offset + i, view.J_px_feature(0, i), view.J_px_feature(1, i));
   if (scale_at_) {
     const Eigen::Vector2d J_scale =
-        view->J_px_pose.leftCols<3>() * (world_from_cam.translation - motion_.world_from_cam.translation) +
-        view->J_px_feature * (scale_direction(feature) - scale_direction(nominal));
+        view.J_px_pose.leftCols<3>() * (world_from_cam.translation - motion_.world_from_cam.translation) +
+        view.J_px_feature * (scale_direction(feature) - scale_direction(*measured.feature));
     put(*scale_at_, J_scale.x(), J_scale.y());
   }
   measured.num_support = n;
+}
+
+bool LocalizationFilter::linearise(Measured& measured) {
+  const Feature& nominal = *measured.feature;
+  const WorldRotation turn(motion_.world_from_cam, delta_.segment<3>(3));
+  const Moved moved = moved_by_delta(nominal, turn);
+  const auto view = expected_view(num_lens() ? camera_at_delta_ : camera_, moved.world_from_cam, moved.feature);
+  if (!view) return false;
+  measured.nu = measured.px - view->px;
+  put_columns(*view, J_px_rotation(*view, nominal, moved, turn), moved, measured);
   measured.c = measured.nu;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(n); ++k)
+  for (std::size_t k = 0; k < static_cast<std::size_t>(measured.num_support); ++k)
     measured.c += delta_[measured.columns[k]] * Eigen::Vector2d(measured.h0[k], measured.h1[k]);
   return true;
 }

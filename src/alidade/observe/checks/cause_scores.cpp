@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/observe/checks/cause_columns.h"
@@ -24,6 +26,49 @@ struct Block {
   VectorXd gradient;
   MatrixXd information;
 };
+
+/// Columns of a cause after the estimated parameters have followed them, in units of their own information.
+struct ReducedCause {
+  std::vector<Index> at;  ///< In the whole system.
+  MatrixXd follow;        ///< n × width: estimated parameters per unit of each.
+  VectorXd unit;          ///< Per column.
+  MatrixXd S, S_inverse;  ///< Information, and its inverse where it is determined.
+  double rank = 1.0;      ///< At least 1.
+
+  ReducedCause(const Block& all, const MatrixXd& inverse_nn, std::vector<Index> columns) : at(std::move(columns)) {
+    MatrixXd cross(width(), inverse_nn.rows());
+    for (Index i = 0; i < width(); ++i)
+      cross.row(i) = all.information.row(at[static_cast<std::size_t>(i)]).head(inverse_nn.rows());
+    follow = -inverse_nn * cross.transpose();
+    const MatrixXd whole = all.information(at, at);
+    unit = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    S = unit.asDiagonal() * (whole + cross * follow) * unit.asDiagonal();
+    const SymmetricEigen eigen = symmetric_eigen(S);
+    VectorXd inverse = VectorXd::Zero(width());
+    for (Index i = 0; i < width(); ++i)
+      if (eigen.values[i] > min_given) inverse[i] = 1.0 / eigen.values[i];
+    S_inverse = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
+    rank = std::max(1.0, static_cast<double>((inverse.array() > 0.0).count()));
+  }
+
+  [[nodiscard]] Index width() const { return static_cast<Index>(at.size()); }
+  [[nodiscard]] VectorXd score(const VectorXd& gradient) const {
+    return unit.asDiagonal() * (gradient(at) + follow.transpose() * gradient.head(follow.rows()));
+  }
+  /// Of all parameters, for one of the cause.
+  [[nodiscard]] VectorXd step(const VectorXd& of_cause, Index size) const {
+    VectorXd all = VectorXd::Zero(size);
+    all.head(follow.rows()) = follow * of_cause;
+    for (Index i = 0; i < width(); ++i) all[at[static_cast<std::size_t>(i)]] = of_cause[i];
+    return all;
+  }
+};
+
+/// A design effect estimated from few blocks is uncertain itself: of Hotelling's statistic, the χ² that is as rare.
+double as_rare_chi2(double chi2, double effect) {
+  constexpr double dof = num_blocks - 1.0;
+  return effect > estimated_effect ? dof * std::log1p(std::max(chi2, 0.0) / dof) : chi2;
+}
 
 class Linearisation {
  public:
@@ -96,6 +141,9 @@ class Linearisation {
     inverse_nn_ = inverse_symmetric(all_.information.topLeftCorner(n_, n_));
   }
 
+  [[nodiscard]] double design_effect(const ReducedCause& cause, const VectorXd& step) const;
+  [[nodiscard]] double likely_share(const CauseColumns::Group& group, const ReducedCause& cause, const VectorXd& score,
+                                    double explained, double effect) const;
   [[nodiscard]] CauseScore score_of(const CauseColumns::Group& group) const;
 
   const Adjustment& reference_;
@@ -110,63 +158,48 @@ class Linearisation {
   RotationPrediction prediction_;
 };
 
+/// Scatter of the score over blocks of time, over what independent observations would leave.
+double Linearisation::design_effect(const ReducedCause& cause, const VectorXd& step) const {
+  MatrixXd scatter = MatrixXd::Zero(cause.width(), cause.width());
+  for (const Block& block : blocks_) {
+    const VectorXd left = cause.score(block.gradient + block.information * step);
+    scatter += left * left.transpose();
+  }
+  return std::max(1.0, (cause.S_inverse * scatter).trace() / cause.rank * num_blocks / (num_blocks - 1.0) / seen_);
+}
+
+/// What it would take of the cause may be more than there ever is: a posterior, with a prior of ordinary sizes. The
+/// share of the likelihood's maximum that is left, `explained` being that maximum.
+double Linearisation::likely_share(const CauseColumns::Group& group, const ReducedCause& cause, const VectorXd& score,
+                                   double explained, double effect) const {
+  VectorXd prior(cause.width());
+  for (Index i = 0; i < cause.width(); ++i) {
+    const double ordinary = columns_.column(group.columns[static_cast<std::size_t>(i)]).ordinary;
+    prior[i] = effect * cause.unit[i] * cause.unit[i] / (ordinary * ordinary * every_);
+  }
+  const double posterior = score.dot(inverse_symmetric(cause.S + MatrixXd(prior.asDiagonal())) * score);
+  return std::clamp(posterior / std::max(explained, 1e-300), 0.0, 1.0);
+}
+
 CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   std::vector<Index> at;
   for (const int column : group.columns) at.push_back(n_ + column);
-  const auto width = static_cast<Index>(at.size());
-  MatrixXd cross(width, n_);
-  for (Index i = 0; i < width; ++i) cross.row(i) = all_.information.row(at[static_cast<std::size_t>(i)]).head(n_);
-  const MatrixXd follow = -inverse_nn_ * cross.transpose();  // n × width: estimated parameters a unit of each
-  const MatrixXd whole = all_.information(at, at);
-  const VectorXd unit = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const MatrixXd S = unit.asDiagonal() * (whole + cross * follow) * unit.asDiagonal();
-  const auto score = [&](const VectorXd& gradient) {
-    return VectorXd(unit.asDiagonal() * (gradient(at) + follow.transpose() * gradient.head(n_)));
-  };
-  const SymmetricEigen eigen = symmetric_eigen(S);
-  VectorXd inverse = VectorXd::Zero(width);
-  for (Index i = 0; i < width; ++i) {
-    if (eigen.values[i] > min_given) inverse[i] = 1.0 / eigen.values[i];
-  }
-  const MatrixXd S_inverse = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
-  const VectorXd s = score(all_.gradient);
-  const VectorXd value = -(S_inverse * s);
-  VectorXd step = VectorXd::Zero(n_ + q_);
-  const VectorXd scaled = unit.asDiagonal() * value;
-  step.head(n_) = follow * scaled;
-  for (Index i = 0; i < width; ++i) step[at[static_cast<std::size_t>(i)]] = scaled[i];
-  MatrixXd scatter = MatrixXd::Zero(width, width);
-  for (const Block& block : blocks_) {
-    const VectorXd left = score(block.gradient + block.information * step);
-    scatter += left * left.transpose();
-  }
-  const double rank = std::max(1.0, static_cast<double>((inverse.array() > 0.0).count()));
-  const double effect = std::max(1.0, (S_inverse * scatter).trace() / rank * num_blocks / (num_blocks - 1.0) / seen_);
-  CauseScore result{.name = group.name, .shift = step.head(n_)};
-  double chi2 = -s.dot(value) / effect;
-  const double explained = chi2;
-  if (effect > estimated_effect) {
-    // A design effect estimated from few blocks is uncertain itself: of Hotelling's statistic, the χ² that is as rare.
-    constexpr double dof = num_blocks - 1.0;
-    chi2 = dof * std::log1p(std::max(chi2, 0.0) / dof);
-  }
-  // What it would take of the cause may be more than there ever is: a posterior, with a prior of ordinary sizes.
-  VectorXd prior(width);
-  for (Index i = 0; i < width; ++i) {
-    const double ordinary = columns_.column(group.columns[static_cast<std::size_t>(i)]).ordinary;
-    prior[i] = effect * unit[i] * unit[i] / (ordinary * ordinary * every_);
-  }
-  const double posterior = s.dot(inverse_symmetric(S + MatrixXd(prior.asDiagonal())) * s);
-  const double likely = std::clamp(posterior / std::max(-s.dot(value), 1e-300), 0.0, 1.0);
+  const ReducedCause cause(all_, inverse_nn_, std::move(at));
+  const VectorXd s = cause.score(all_.gradient), value = -(cause.S_inverse * s);
+  const VectorXd scaled = cause.unit.asDiagonal() * value, step = cause.step(scaled, n_ + q_);
+  const double effect = design_effect(cause, step), likelihood = -s.dot(value), explained = likelihood / effect;
+  const double chi2 = std::max(0.0, as_rare_chi2(explained, effect));
   const double count = 2.0 * static_cast<double>(reference_.bundle.observations.size());
-  result.z = rank > 1.0 ? std::sqrt(std::max(0.0, chi2 - 2.0 * (rank - 1.0))) : std::sqrt(std::max(0.0, chi2));
-  result.gain = likely * explained - rank * std::log(count);
-  const VectorXd whole_unit = unit.cwiseInverse();
-  result.information = whole_unit.asDiagonal() * S * whole_unit.asDiagonal() * (every_ / effect);
-  for (Index i = 0; i < width; ++i) {
+  CauseScore result{.name = group.name, .shift = step.head(n_)};
+  result.z = std::sqrt(cause.rank > 1.0 ? std::max(0.0, chi2 - 2.0 * (cause.rank - 1.0)) : chi2);
+  result.gain = likely_share(group, cause, s, likelihood, effect) * explained - cause.rank * std::log(count);
+  const VectorXd whole_unit = cause.unit.cwiseInverse();
+  result.information = whole_unit.asDiagonal() * cause.S * whole_unit.asDiagonal() * (every_ / effect);
+  for (Index i = 0; i < cause.width(); ++i) {
     const CauseColumns::Column& column = columns_.column(group.columns[static_cast<std::size_t>(i)]);
-    const double variance = S_inverse(i, i) * effect / every_;
-    result.members.push_back({column.member, column.unit, scaled[i], unit[i] * std::sqrt(variance), follow.col(i)});
+    const double variance = cause.S_inverse(i, i) * effect / every_;
+    result.members.push_back(
+        {column.member, column.unit, scaled[i], cause.unit[i] * std::sqrt(variance), cause.follow.col(i)});
   }
   return result;
 }

@@ -283,6 +283,39 @@ void fill_estimate(const Board& board, const Calibration& calibration, ResultDoc
   if (board.marker_m > 0.0) target["marker_m"] = board.marker_m;
 }
 
+JsonValue photos_of(const Calibration& calibration) {
+  const CalibrateReport& report = calibration;
+  JsonValue photos = JsonValue::list();
+  for (std::size_t k = 0; k < calibration.board_views.size(); ++k) {
+    const ViewFit& fit = report.views[k];
+    JsonValue row;
+    row["file"] = calibration.board_views[k].photo;
+    row["used"] = fit.used;
+    row["rms_px"] = fit.used ? fit.rms_px : std::nan("");
+    row["reason"] = fit.reason;
+    photos.push_back(std::move(row));
+  }
+  return photos;
+}
+
+JsonValue rejected_corners(const Calibration& calibration) {
+  const auto& views = calibration.board_views;
+  const CalibrateReport& report = calibration;
+  JsonValue rejected = JsonValue::list();
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
+      const CornerResidual& fit = report.views[k].corners[i];
+      if (fit.used) continue;
+      JsonValue row;
+      row["file"] = views[k].photo;
+      row["corner"] = views[k].corners[i].index;
+      row["residual_px"] = fit.residual_px.norm();
+      rejected.push_back(std::move(row));
+    }
+  }
+  return rejected;
+}
+
 }  // namespace
 
 DataTable next_photos_table(const NextPhotoPlan& next) {
@@ -309,43 +342,19 @@ DataTable points_in_board_table(const std::vector<Eigen::Vector3d>& points_in_bo
 }
 
 void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document) {
-  const auto& views = calibration.board_views;
   const CalibrateReport& report = calibration;
   document.counts = calibration.counts;
-  JsonValue photos = JsonValue::list();
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    const ViewFit& fit = report.views[k];
-    JsonValue row;
-    row["file"] = views[k].photo;
-    row["used"] = fit.used;
-    row["rms_px"] = fit.used ? fit.rms_px : std::nan("");
-    row["reason"] = fit.reason;
-    photos.push_back(std::move(row));
-  }
   const bool solved = report.status == CalibrateReport::Status::converged;
   document.assumed = calibration.assumed;
   if (solved) {
     fill_estimate(board, calibration, document);
-    JsonValue rejected = JsonValue::list();
-    for (std::size_t k = 0; k < views.size(); ++k) {
-      for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
-        const CornerResidual& fit = report.views[k].corners[i];
-        if (fit.used) continue;
-        JsonValue row;
-        row["file"] = views[k].photo;
-        row["corner"] = views[k].corners[i].index;
-        row["residual_px"] = fit.residual_px.norm();
-        rejected.push_back(std::move(row));
-      }
-    }
     document.estimate["corners_used"] = report.corners_used;
-    document.estimate["corners_rejected"] = std::move(rejected);
-  }
-  if (!solved) {
+    document.estimate["corners_rejected"] = rejected_corners(calibration);
+  } else {
     document.estimate["camera"]["width"] = calibration.size.width_px;
     document.estimate["camera"]["height"] = calibration.size.height_px;
   }
-  document.estimate["photos"] = std::move(photos);
+  document.estimate["photos"] = photos_of(calibration);
   document.data = {photos_table(board, calibration), corners_table(board, calibration)};
   if (!solved) return;
   for (DataTable& table : std::vector<DataTable>{cells_table(calibration.study), rings_table(calibration.study),

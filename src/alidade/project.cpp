@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/track/checks/track_assumed.h"
 
@@ -119,9 +121,115 @@ void heed_other_camera(const ProjectConfig& config, const Camera& camera, Verdic
   heed(check, "use " + (config.own_camera_name.empty() ? "that camera" : config.own_camera_name), verdict);
 }
 
+bool is_in_image(const Camera& camera, const Eigen::Vector2d& px) {
+  return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
+}
+
+/// What the image shows: a lens is known where photos calibrated it, and its polynomials are anything beyond.
+Check image_check(const Camera& camera, const std::vector<ProjectedReading>& projected) {
+  Check check{.name = "in the image", .text = "all points are in the image"};
+  std::size_t behind = 0, outside = 0;
+  double first_m = 0.0;
+  for (const ProjectedReading& one : projected) {
+    const bool is_behind = !(one.point.point_in_cam.z() > 0.0) && !one.pixel;
+    const bool is_outside = !is_behind && !(one.pixel && is_in_image(camera, one.pixel->px));
+    if (behind + outside == 0 && (is_behind || is_outside)) first_m = one.range_m;
+    behind += is_behind ? 1 : 0;
+    outside += is_outside ? 1 : 0;
+  }
+  if (behind + outside == 0) return check;
+  check.state = State::care;
+  check.value = static_cast<double>(behind + outside);
+  const std::string where = behind > 0 ? "behind the camera" : "outside the image, where its lens is not calibrated";
+  check.text = fmt::format("{} of {} point{} {} {}, the first at {:g} m", behind > 0 ? behind : outside,
+                           projected.size(), projected.size() == 1 ? "" : "s",
+                           (behind > 0 ? behind : outside) == 1 ? "is" : "are", where, first_m);
+  return check;
+}
+
+/// The same for the heads of a rig.
+Check image_check(const Rig& rig, const std::vector<HeadProjection>& heads) {
+  Check check{.name = "in the image", .text = "each head has the point in its image"};
+  std::string without;
+  for (std::size_t h = 0; h < heads.size(); ++h) {
+    if (heads[h].pixel && is_in_image(rig.heads[h].camera, heads[h].pixel->px)) continue;
+    without += fmt::format("{}{}", without.empty() ? "" : ", ", heads[h].id);
+    check.value += 1.0;
+  }
+  if (without.empty()) return check;
+  check.state = State::care;
+  check.text = "the point is not in the image of head " + without;
+  return check;
+}
+
+/// By how much of the pixel's own σ the lens bends over σ of the point; infinite where a point within σ is not seen.
+double bend_of(const Camera& camera, const ProjectedReading& one) {
+  constexpr double small_px = 1.0;  // of a move: what it bends is less
+  const SymmetricEigen3 axes = symmetric_eigen3(one.point.cov);
+  double worst = 0.0;
+  for (int i = 0; i < 3 && one.pixel; ++i) {
+    const Eigen::Vector3d step = std::sqrt(std::max(0.0, axes.values[i])) * axes.vectors.col(i);
+    const auto ahead = project(camera, one.point.point_in_cam + step);
+    const auto back = project(camera, one.point.point_in_cam - step);
+    if (!ahead || !back) return std::numeric_limits<double>::infinity();
+    const double half = 0.5 * (*ahead - *back).norm(), bent = (0.5 * (*ahead + *back) - one.pixel->px).norm();
+    const double linear = (project_with_jacobians(camera, one.point.point_in_cam)->J_px_point * step).norm();
+    if (std::max(half, linear) > small_px)
+      worst = std::max(worst, std::max(bent, std::abs(half - linear)) / std::max(linear, small_px));
+  }
+  return worst;
+}
+
+/// σ of a pixel is propagated linearly: it says nothing where the lens bends within it.
+Check linear_check(const Beam& beam, const Camera& camera, const std::vector<ProjectedReading>& projected) {
+  Check check{.name = "linear", .text = "σ is small enough to be propagated linearly", .limit = 0.3};
+  check.value = std::sqrt(std::max(0.0, beam.cov.block<2, 2>(beam_direction_param, beam_direction_param).trace()));
+  double at_m = projected.front().range_m;  // of a direction on a sphere
+  for (const ProjectedReading& one : projected) {
+    const double bend = bend_of(camera, one);
+    if (!(bend > check.value)) continue;
+    check.value = bend;
+    at_m = one.range_m;
+  }
+  if (check.value <= check.limit) return check;
+  check.state = State::care;
+  check.text =
+      fmt::format("σ of the point at {:g} m is too large for its pixel's σ, which is propagated linearly", at_m);
+  check.value = std::min(check.value, 1e6);
+  return check;
+}
+
+/// Lengths that no rangefinder beside a camera has: of another unit.
+Check units_check(const Beam& beam, const std::vector<double>& ranges_m, std::optional<double> sigma_range_m) {
+  Check check{.name = "units", .text = "origin and readings are such as metres give"};
+  constexpr double far_m = 2.0;    // from the camera; an instrument and its camera are one thing
+  constexpr double finest = 1e-5;  // σ of a reading over it: geodetic instruments come to there
+  const double distance_m = beam.origin_in_cam.norm(), longest_m = std::ranges::max(ranges_m);
+  const double sigma_m = sigma_range_m.value_or(beam.noise.sigma_at(longest_m));
+  if (distance_m > far_m) {
+    check.state = State::care;
+    check.text = fmt::format("the beam's origin is {:.3g} m from the camera: origin_m is in metres", distance_m);
+  } else if (sigma_m > 0.0 && sigma_m < finest * longest_m) {
+    check.state = State::care;
+    check.text = fmt::format("a reading of {:g} m with a σ of {:.2g} m: readings are in metres", longest_m, sigma_m);
+  }
+  return check;
+}
+
+/// Whether it is a covariance: some combination of more than two parameters may have a negative variance.
+bool is_covariance(const Eigen::MatrixXd& cov) {
+  constexpr double rounding = 1e-4;  // of correlations that a file rounds
+  if (cov.size() == 0) return true;
+  if (!cov.allFinite() || cov.diagonal().minCoeff() < 0.0) return false;
+  const Eigen::VectorXd scale =
+      cov.diagonal().unaryExpr([](double variance) { return variance > 0.0 ? 1.0 / std::sqrt(variance) : 0.0; });
+  return symmetric_eigenvalues(scale.asDiagonal() * cov * scale.asDiagonal()).minCoeff() > -rounding;
+}
+
 void require_camera(const Camera& camera) {
   const std::string of_camera = fault(RigHead{{}, camera});
   if (!of_camera.empty()) throw ConfigError("the camera: " + of_camera);
+  if (!is_covariance(camera.cov)) throw ConfigError("the camera: its covariance has a negative variance");
 }
 
 void require_sense(const Beam& beam, const std::vector<double>& ranges_m) {
@@ -132,6 +240,7 @@ void require_sense(const Beam& beam, const std::vector<double>& ranges_m) {
   if (!beam.cov.allFinite() || !beam.cov_with_lens.allFinite() ||
       (beam.cov_with_lens.size() > 0 && beam.cov_with_lens.rows() != num_beam_params))
     throw ConfigError("the beam's covariance is not finite, or not of its six parameters");
+  if (!is_covariance(beam.cov)) throw ConfigError("the beam's covariance has a negative variance");
   if (ranges_m.empty()) throw ConfigError("there are no readings");
   for (const double range_m : ranges_m)
     if (!(range_m > 0.0 && range_m <= max_length_m))
@@ -229,6 +338,11 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
                                         result.readings.size() == 1 ? "" : "s");
   add_beam_assumptions(result.beam, camera, result.readings, result.assumed);
   add_camera_assumptions(camera, result.readings, result.assumed);
+  heed(units_check(beam, ranges_m, config.sigma_range_m), "give lengths in metres: 2310 mm are --range 2.31",
+       result.verdict);
+  heed(image_check(camera, result.readings), "check origin, direction and camera of the beam", result.verdict);
+  heed(linear_check(beam, camera, result.readings), "use a beam that is better known, or a larger range",
+       result.verdict);
   heed_assumptions(result.assumed, result.verdict);
   heed_other_camera(config, camera, result.verdict);
   return result;
@@ -267,6 +381,7 @@ RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, c
   result.verdict.sentence =
       fmt::format("{} of {} heads have the point in their observation", seen_by.size(), rig.heads.size());
   result.point_cov = covariance_of_point(rig, errors, seen_by, *point_in_world);
+  heed(image_check(rig, result.heads), "check the angles and the point", result.verdict);
   heed(files_check(rig), "use files with their covariance: alidade calibrate and alidade rig write it", result.verdict);
   return result;
 }

@@ -51,6 +51,80 @@ TEST(ProjectFace, AnotherCameraThanTheBeamsIsSaid) {
   EXPECT_EQ(result.verdict.state, State::care);
 }
 
+/// 1280×960, f 600 px: 94° wide.
+Camera wide_camera() {
+  Camera camera{.width_px = 1280, .height_px = 960, .lens = *make_lens("brown")};
+  Eigen::VectorXd lens = Eigen::VectorXd::Zero(10);
+  lens << 600.0, 600.0, 639.5, 479.5, 0.0, -0.3, 0.08, 0.0, 0.0, 0.0;
+  camera.lens = with_params(camera.lens, lens);
+  camera.cov = Eigen::MatrixXd::Zero(10, 10);
+  camera.cov.diagonal().head<4>().setConstant(0.25);
+  return camera;
+}
+
+/// The checks that are not good, by name; "" where the verdict is.
+std::string named_by(const Beam& beam, const std::vector<double>& ranges_m) {
+  const BeamProjection result = project_readings(beam, wide_camera(), ranges_m);
+  std::string names;
+  for (const Check& check : result.verdict.checks)
+    if (check.state != State::good) names += (names.empty() ? "" : ", ") + check.name;
+  EXPECT_EQ(names.empty(), result.verdict.state == State::good);
+  return names;
+}
+
+TEST(ProjectFace, WhatIsNotSeenOrOfAnotherUnitIsNamed) {
+  const Beam good = beside_the_lens();
+  EXPECT_EQ(named_by(good, {0.5, 1.0, 2.0, 30.0}), "");
+  Beam through_centre = good;
+  through_centre.origin_in_cam.setZero();
+  EXPECT_EQ(named_by(through_centre, {1.0, 2.0}), "");
+  Beam millimetres = good;
+  millimetres.origin_in_cam *= 1000.0;
+  EXPECT_EQ(named_by(millimetres, {2.0}), "units, in the image");
+  EXPECT_EQ(named_by(good, {2310.0}), "units");
+  Beam backwards = good;
+  backwards.direction_in_cam = {0.0, 0.0, -1.0};
+  EXPECT_EQ(named_by(backwards, {2.0}), "in the image");
+  // The polynomial of this lens goes on beyond the image's corner, up to 45000 px.
+  for (const double x : {0.9, 0.97}) {
+    Beam aside = good;
+    aside.direction_in_cam = {x, 0.0, std::sqrt(1.0 - x * x)};
+    EXPECT_EQ(named_by(aside, {2.0}), "in the image") << x;
+  }
+}
+
+TEST(ProjectFace, ASigmaThatIsNotLinearIsNamed) {
+  Beam unknown = beside_the_lens();
+  unknown.cov.diagonal().head<3>().setConstant(400.0);
+  EXPECT_EQ(named_by(unknown, {2.0}), "linear");
+  unknown = beside_the_lens();
+  unknown.cov.diagonal().segment<2>(3).setConstant(0.5);
+  EXPECT_EQ(named_by(unknown, {2.0}), "linear");
+  Beam near = beside_the_lens();
+  near.origin_in_cam = {0.001, 0.0, -0.998};  // 2 mm before the lens, ± 2 mm
+  EXPECT_EQ(named_by(near, {1.0}), "linear");
+}
+
+TEST(ProjectFace, ACovarianceThatIsNoneIsRefused) {
+  Beam beam = beside_the_lens();  // in pairs it could be one
+  beam.cov.topLeftCorner<3, 3>() << 1.0, 0.9, 0.9, 0.9, 1.0, -0.9, 0.9, -0.9, 1.0;
+  EXPECT_THROW((void)project_readings(beam, wide_camera(), {1.0}), ConfigError);
+  Camera camera = wide_camera();
+  camera.cov.topLeftCorner<3, 3>() = beam.cov.topLeftCorner<3, 3>();
+  EXPECT_THROW((void)project_readings(beside_the_lens(), camera, {1.0}), ConfigError);
+}
+
+TEST(ProjectFace, APointOutsideAHeadsImageIsNamed) {
+  Rig rig = two_heads();
+  const Eigen::Vector3d point_in_world(0.2, -0.1, 2.0);
+  const RigProjection seen = project_rig(rig, {0.1, -0.1}, {0.05}, point_in_world);
+  EXPECT_EQ(seen.verdict.sentence.find("not in the image"), std::string::npos) << seen.verdict.sentence;
+  rig.heads[0].camera.width_px = static_cast<int>(seen.heads[0].pixel->px.x()) - 1;
+  const RigProjection result = project_rig(rig, {0.1, -0.1}, {0.05}, point_in_world);
+  EXPECT_EQ(result.verdict.state, State::care);
+  EXPECT_NE(result.verdict.sentence.find("not in the image of head 1"), std::string::npos) << result.verdict.sentence;
+}
+
 TEST(ProjectFace, HeadsSeeAPoint) {
   const RigProjection result = project_rig(two_heads(), {0.1, -0.1}, {0.05}, Eigen::Vector3d(0.2, -0.1, 2.0));
   ASSERT_EQ(result.heads.size(), 2u);

@@ -278,7 +278,6 @@ TEST(MovingTarget, FalseLabelsAreFound) {
   EXPECT_LT(sum / num, 1.8);  // of 48 numbers, a σ of 0.2 where all are apart
 }
 
-/// ALIDADE_TEST_TRIALS=2 draws two scenes.
 TEST(MovingTarget, TheCameraThatIsWrongIsNamed) {
   const auto num_scenes = static_cast<unsigned>(testing::trials(1));
   for (unsigned seed = 31; seed < 31 + num_scenes; ++seed) {
@@ -310,24 +309,29 @@ TEST(MovingTarget, TheCameraThatIsWrongIsNamed) {
   }
 }
 
-/// A focal length 3 % off passes for other positions, 6 to 9 of their σ away. Where the other lenses are alike, an
-/// exchange of two moves it to another head, which explains nothing.
+/// A focal length 3 % off passes for other positions, 6 to 9 of their σ away; an exchange of two equal lenses only
+/// moves it to another head. ALIDADE_TEST_TRIALS=20 draws twenty scenes for each head, and for none.
 TEST(MovingTarget, ALensThatIsNotItsFilesIsNamed) {
-  for (std::size_t c = 0; c < 3; ++c) {
-    const Scene scene = scene_of(loops, 41 + static_cast<unsigned>(c), false);
-    const MovingTargetConfig config{.distance = true_distance(scene)};
-    std::vector<RigHead> heads = unplaced(scene);
-    Eigen::VectorXd lens = params(heads[c].camera.lens);
-    lens.head<2>() *= 1.03;
-    heads[c].camera.lens = with_params(heads[c].camera.lens, lens);
-    const Verdict verdict = moving_target_verdict(place_cameras(scene.observations, heads, config), config);
-    EXPECT_NE(verdict.state, State::good) << c;
-    const std::string name = "head " + std::to_string(c + 1) + ": the observations ask for a focal length";
-    EXPECT_NE(verdict.to_add.find(name), std::string::npos) << verdict.sentence << "; " << verdict.to_add;
+  const int draws = testing::trials(1);
+  for (std::size_t c = 0, named = 0, good = 0; c < 4; ++c, named = good = 0) {  // 3: none
+    for (int draw = 0; draw < draws; ++draw) {
+      const Scene scene = scene_of(loops, 41 + static_cast<unsigned>(c) + 3 * static_cast<unsigned>(draw), false);
+      const MovingTargetConfig config{.distance = true_distance(scene)};
+      std::vector<RigHead> heads = unplaced(scene);
+      Eigen::VectorXd lens = params(heads[c % 3].camera.lens);
+      lens.head<2>() *= c < 3 ? 1.03 : 1.0;
+      heads[c % 3].camera.lens = with_params(heads[c % 3].camera.lens, lens);
+      const Verdict verdict = moving_target_verdict(place_cameras(scene.observations, heads, config), config);
+      const std::string name = "head " + std::to_string(c + 1) + ": the observations ask for a focal length";
+      named += verdict.to_add.find(name) != std::string::npos;
+      good += verdict.state == State::good;
+    }
+    EXPECT_GE(c < 3 ? (good == 0 ? named : 0) : good, static_cast<std::size_t>(draws - draws / 20))
+        << c << ": " << named << " named, " << good << " good";
   }
 }
 
-/// A mirrored world is one: pixels alone do not show it, a true path does.
+/// Pixels alone do not show a mirrored world, a true path does.
 TEST(MovingTarget, MirroredImagesOfAllCamerasAreFoundByATruePath) {
   Scene scene = scene_of(loops, 12, false);
   for (TargetObservation& observation : scene.observations) observation.px.x() = 1919.0 - observation.px.x();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/testing/track_sample.h"
 #include "alidade/testing/trials.h"
@@ -22,17 +23,13 @@ struct Judged {
   double worst_sigma = 0.0;  ///< Largest error of a coordinate in its σ, after the warm-up.
 };
 
-/// As `alidade track` judges events whose rig file says nothing of its errors.
-Judged judged(const TrackScene& scene, std::uint64_t seed, TargetMotion method = TargetMotion::cv) {
+/// As `alidade track` judges events by a rig file.
+Judged judged_by(const Rig& rig, const TrackScene& scene, std::uint64_t seed, FollowConfig config) {
   const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
-  FollowConfig config;
-  config.tracker.method = method;
   Judged result;
-  result.report = track_target(observations, scene.heads, config);
-  result.verdict = track_verdict(result.report, observations, scene.heads, config);
+  result.report = track_target(observations, rig.heads, config);
+  result.verdict = track_verdict(result.report, observations, rig.heads, config);
   if (result.verdict.exit_code != ExitCode::ok) return result;
-  Rig rig;
-  rig.heads = scene.heads;
   heed_assumptions(track_assumed(observations, rig, config, result.report, {}), result.verdict);
   for (const TrackStep& step : result.report.steps) {
     if (!step.has_belief || step.t_s < 1.5) continue;
@@ -41,6 +38,15 @@ Judged judged(const TrackScene& scene, std::uint64_t seed, TargetMotion method =
       result.worst_sigma = std::max(result.worst_sigma, std::abs(error[k]) / std::sqrt(step.belief.P(k, k)));
   }
   return result;
+}
+
+/// By a rig file that says nothing of its errors.
+Judged judged(const TrackScene& scene, std::uint64_t seed, TargetMotion method = TargetMotion::cv) {
+  FollowConfig config;
+  config.tracker.method = method;
+  Rig rig;
+  rig.heads = scene.heads;
+  return judged_by(rig, scene, seed, config);
 }
 
 TrackScene faulty(const std::string& name, const std::function<void(TrackFaults&)>& fault) {
@@ -116,6 +122,44 @@ TEST(TrackFaults, CleanScenariosAreGood) {
     }
     EXPECT_GE(num_good, draws - draws / 20) << name;
     RecordProperty(std::string("good_") + name, num_good);
+  }
+}
+
+/// The rig with lenses that are known to 0.3 px, of which one is off by that many pixels in cy.
+Rig rig_with_centre_off(const TrackScene& scene, double off_px) {
+  Rig rig;
+  rig.heads.assign(scene.heads.begin(), scene.heads.end());
+  rig.cov.setZero(2 * num_head_params, 2 * num_head_params);
+  for (RigHead& head : rig.heads) {
+    const Eigen::Index num = params(head.camera.lens).size();
+    head.camera.cov.setZero(num, num);
+    head.camera.cov.diagonal().head<4>().setConstant(0.09);
+  }
+  Eigen::VectorXd lens = params(rig.heads[1].camera.lens);
+  lens[3] += off_px;
+  rig.heads[1].camera.lens = with_params(rig.heads[1].camera.lens, lens);
+  return rig;
+}
+
+/// A centre that is off by more than its file says is never a good verdict far from the truth; right ones are good.
+TEST(TrackFaults, ACentreThatIsOffIsNotSilent) {
+  const int draws = testing::trials(1);
+  const TrackScene scene = *track_scenario("C");
+  for (const double off_px : {0.0, 1.0, 2.0, 3.0, 10.0}) {
+    const Rig rig = rig_with_centre_off(scene, off_px);
+    FollowConfig config;
+    config.tracker.errors = rig_uncertainty(rig);
+    int good = 0, silent = 0;
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(draws); ++seed) {
+      const Judged result = judged_by(rig, scene, seed, config);
+      good += result.verdict.state == State::good ? 1 : 0;
+      silent += result.verdict.state == State::good && result.worst_sigma > 5.0 ? 1 : 0;
+    }
+    EXPECT_EQ(silent, 0) << off_px << " px, of " << draws;
+    if (off_px == 0.0) EXPECT_GE(good, draws - draws / 20);
+    const std::string px = std::to_string(static_cast<int>(off_px)) + "px";
+    RecordProperty("good_" + px, good);
+    RecordProperty("silent_" + px, silent);
   }
 }
 

@@ -13,7 +13,9 @@ namespace alidade {
 namespace {
 
 using P = PositionerPlace;
-const std::vector<int> all_places{P::rate, P::acceleration, P::time_constant, P::latency, P::backlash, P::offset};
+const std::vector<int> own_places{P::rate, P::acceleration, P::time_constant, P::latency, P::backlash, P::offset};
+const std::vector<int> sampled_places{P::rate,     P::acceleration, P::time_constant, P::latency,
+                                      P::backlash, P::offset,       P::sampling};
 constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3;
 
 /// The largest rate that lasted for 0.15 s or more.
@@ -59,14 +61,14 @@ PositionerVector best_start(const PositionerProblem& problem, double rate, doubl
       for (const double share : {0.1, 0.4, 0.65, 0.85}) {
         PositionerVector theta;
         theta << std::log(std::max(rate, 1e-4)), std::log(acceleration * degree), std::log(tau), latency * share,
-            0.05 * degree, 0.0;
+            0.05 * degree, 0.0, 0.0;
         grid.emplace_back(quadratic.misfit(theta).squaredNorm(), theta);
       }
   std::ranges::sort(grid, {}, &std::pair<double, PositionerVector>::first);
   PositionerVector best = grid.front().second;
   double cost = 1e300;
   const auto try_from = [&](PositionerVector theta) {
-    const double reached = quadratic.solve(theta, all_places, few_steps);
+    const double reached = quadratic.solve(theta, own_places, few_steps);
     if (reached >= cost) return;
     cost = reached;
     best = theta;
@@ -107,11 +109,12 @@ PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVec
 }
 
 /// The loss where one parameter is fixed at zero, the others refitted: 2 ln of the likelihood ratio.
-double evidence_of(const PositionerProblem& problem, PositionerVector theta, int place, double nothing, double noise2) {
+double evidence_of(const PositionerProblem& problem, PositionerVector theta, const std::vector<int>& free, int place,
+                   double nothing, double noise2) {
   constexpr int few_steps = 20;
-  const double with = problem.solve(theta, all_places, few_steps);
+  const double with = problem.solve(theta, free, few_steps);
   std::vector<int> others;
-  for (const int each : all_places)
+  for (const int each : free)
     if (each != place) others.push_back(each);
   theta[place] = nothing;
   return (problem.solve(theta, others, few_steps) - with) / noise2;
@@ -183,8 +186,10 @@ void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& 
   theta[P::latency] = std::max(0.0, theta[P::latency] - 0.5 * sampling->period_s);
   for (int round = 0; round < rounds; ++round) {
     problem = as_asked;
+    theta[P::sampling] = 0.0;
     problem.set_sampling(*sampling, theta);
-    cost = problem.solve(theta, all_places);
+    cost = problem.solve(theta, sampled_places);
+    sampling = problem.fitted(*sampling, theta);
     if (round == 0) {  // the residuals of the times of requests determine it better now
       if (const auto again = as_asked.find_sampling(theta)) sampling = again;
     } else if (round + 1 < rounds) {
@@ -276,14 +281,17 @@ PositionerFit fit_positioner(const PositionerLog& log) {
   }
   fit.fastest_rad_s = fastest(problem.readings());
   PositionerVector theta = best_start(problem, fit.fastest_rad_s, first_latency(log));
-  double cost = problem.solve(theta, all_places);
+  double cost = problem.solve(theta, own_places);
   find_sampling(problem, theta, cost, fit);
-  const double noise2 = std::max(1.0, cost / static_cast<double>(problem.size() - all_places.size()));
-  fit.noise = std::sqrt(cost / static_cast<double>(problem.size() - all_places.size()));
-  PositionerVector sigma = sigmas_of(problem, theta, all_places, noise2);
+  const std::vector<int>& free = fit.encoder_hz > 0.0 ? sampled_places : own_places;
+  const double noise2 = std::max(1.0, cost / static_cast<double>(problem.size() - free.size()));
+  fit.noise = std::sqrt(cost / static_cast<double>(problem.size() - free.size()));
+  PositionerVector sigma = sigmas_of(problem, theta, free, noise2);
   const double least = std::log(static_cast<double>(problem.size())) + 6.0;  // BIC, and some for what is not modelled
   const PositionerParams params = positioner_params(theta, fit.dead_band.value);
-  const auto test = [&](int place, double nothing) { return evidence_of(problem, theta, place, nothing, noise2); };
+  const auto test = [&](int place, double nothing) {
+    return evidence_of(problem, theta, free, place, nothing, noise2);
+  };
   fit.reached_rate = params.rate_rad_s < 1.1 * fit.fastest_rad_s;
   fit.rate = {params.rate_rad_s, sigma[P::rate] * params.rate_rad_s, fit.reached_rate, 0.0};
   if (!fit.reached_rate) {

@@ -82,7 +82,16 @@ std::vector<double> PositionerProblem::response(const PositionerVector& theta, c
   return angles;
 }
 
-std::vector<double> PositionerProblem::model(const PositionerVector& theta) const { return response(theta, times_); }
+/// Of another period, about the middle of the log: what is common is the latency's.
+std::vector<double> PositionerProblem::sampled_times(double sampling) const {
+  std::vector<double> times = times_;
+  for (double& time : times) time += sampling * (time - middle_s());
+  return times;
+}
+
+std::vector<double> PositionerProblem::model(const PositionerVector& theta) const {
+  return response(theta, sampled_times(theta[PositionerPlace::sampling]));
+}
 
 Eigen::VectorXd PositionerProblem::misfit(const PositionerVector& theta) const {
   const std::vector<double> angles = model(theta);
@@ -95,7 +104,7 @@ Eigen::VectorXd PositionerProblem::misfit(const PositionerVector& theta) const {
 }
 
 Eigen::MatrixXd PositionerProblem::jacobian(const PositionerVector& theta, const std::vector<int>& free) const {
-  static const PositionerVector steps = (PositionerVector() << 2e-3, 1e-2, 1e-2, 5e-4, 2e-4, 1e-4).finished();
+  static const PositionerVector steps = (PositionerVector() << 2e-3, 1e-2, 1e-2, 5e-4, 2e-4, 1e-4, 1e-5).finished();
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(size()), PositionerPlace::count);
   for (const int place : free) {
     PositionerVector low = theta, high = theta;
@@ -145,6 +154,11 @@ EncoderSampling PositionerProblem::refined(const EncoderSampling& sampling, Posi
       std::max(0.0, theta[PositionerPlace::latency] +
                         (shift_s < 0.5 * sampling.period_s ? shift_s : shift_s - sampling.period_s));
   return better;
+}
+
+EncoderSampling PositionerProblem::fitted(const EncoderSampling& sampling, const PositionerVector& theta) const {
+  const double by = theta[PositionerPlace::sampling];
+  return {sampling.period_s * (1.0 + by), sampling.phase_s + by * (sampling.phase_s - middle_s())};
 }
 
 void PositionerProblem::set_sampling(const EncoderSampling& sampling, const PositionerVector& theta) {

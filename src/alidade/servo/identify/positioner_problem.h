@@ -9,9 +9,10 @@
 
 namespace alidade {
 
-/// Indices of the fitted parameters: logarithms of rate, acceleration and time constant, then seconds and radians.
+/// Indices of the fitted parameters: logarithms of rate, acceleration and time constant, then seconds and radians; by
+/// how much of itself the period of the encoder's sampling is longer than the one that was set.
 struct PositionerPlace {
-  enum : int { rate, acceleration, time_constant, latency, backlash, offset, count };
+  enum : int { rate, acceleration, time_constant, latency, backlash, offset, sampling, count };
 };
 using PositionerVector = Eigen::Vector<double, PositionerPlace::count>;
 
@@ -41,6 +42,9 @@ class PositionerProblem {
   /// latency of `theta` follows its phase.
   [[nodiscard]] EncoderSampling refined(const EncoderSampling& sampling, PositionerVector& theta) const;
 
+  /// A sampling that was set, with the period that was fitted since.
+  [[nodiscard]] EncoderSampling fitted(const EncoderSampling& sampling, const PositionerVector& theta) const;
+
   [[nodiscard]] const std::vector<PositionerReading>& readings() const { return readings_; }
   [[nodiscard]] const std::vector<double>& rates() const { return rate_; }
   /// Which command's doing a reading is: its cluster.
@@ -48,6 +52,8 @@ class PositionerProblem {
 
  private:
   [[nodiscard]] std::vector<double> response(const PositionerVector& theta, const std::vector<double>& times) const;
+  [[nodiscard]] std::vector<double> sampled_times(double sampling) const;
+  [[nodiscard]] double middle_s() const { return 0.5 * (times_.front() + times_.back()); }
   [[nodiscard]] AxisReadings axis_readings(const PositionerVector& theta) const;
 
   std::vector<PositionCommand> commands_;

@@ -6,6 +6,7 @@
 #include "alidade/calibrate/checks/better_model.h"
 #include "alidade/calibrate/checks/calibration_verdict.h"
 #include "alidade/calibrate/checks/judge.h"
+#include "alidade/calibrate/checks/lens_change.h"
 
 namespace alidade {
 namespace {
@@ -33,6 +34,22 @@ Counts count_photos(const Calibration& result) {
   }
   counts.dropped = counts.given - counts.used;
   return counts;
+}
+
+std::vector<std::string> used_photos(const Calibration& result) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < result.board_views.size(); ++k)
+    if (result.views[k].used) names.push_back(result.board_views[k].photo);
+  return names;
+}
+
+/// A change of the lens over the photos that calibrations of its parts confirm.
+LensChangeStudy find_change(const Calibration& result) {
+  LensChangeStudy study = lens_change(view_scores(result.board, result.config, result.board_views, result), result);
+  if (study.change && study.change->is_proved &&
+      !is_confirmed(*study.change, result.board, result.board_views, result.config, result))
+    study.change.reset();
+  return study;
 }
 
 /// The board as solved: decides its shape, and solves again where that is not the one of the first solve.
@@ -74,11 +91,14 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   const std::vector<ShapeTransfer> transfers = settle_shape(result, progress);
   result.counts = count_photos(result);
   result.assumed = count_assumptions(board, result.config, result.board_views, air, result);
+  const LensChangeStudy change = find_change(result);
+  if (change.change) count_change(*change.change, result);
   result.study = study_calibration(board, result.board_views, result.config, result,
                                    max_informative(transfers, result.config.board_shape), progress);
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
+  heed_change(change, used_photos(result), result.verdict);
   heed_assumptions(result.assumed, result.verdict);
   return result;
 }

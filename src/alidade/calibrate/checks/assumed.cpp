@@ -5,9 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/calibrate/setup.h"
-#include "alidade/calibrate/solve/bundle.h"
-#include "alidade/calibrate/solve/normal_equations.h"
+#include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/calibrate/study.h"
 
 namespace alidade {
@@ -26,42 +24,13 @@ double ordinary_error(const std::string& name, double value) {
   return 0.0;                                    // a term that the model does not have
 }
 
-/// Lens parameters by position: those estimated, and those fixed.
-struct Split {
-  std::vector<Index> free, fixed;
-};
-
-Split split_of(const CalibrateReport& report) {
-  Split split;
-  for (Index i = 0; i < report.model_cov.rows(); ++i)
-    (report.model_cov(i, i) > 0.0 ? split.free : split.fixed).push_back(i);
-  return split;
-}
-
 /// dθ/da of the free with respect to the fixed parameters; empty where the linearisation fails.
-Eigen::MatrixXd sensitivity(const Board& board, CalibrateConfig config, std::span<const BoardView> views,
-                            const CalibrateReport& report, const Split& split) {
-  config.fixed.clear();
-  config.board_shape = BoardShape::given;
-  BundleProblem problem;
-  (void)set_up_problem(board, config, {report.camera.width_px, report.camera.height_px}, problem);
-  problem.prior_information.setZero();
-  std::vector<ViewArrays> arrays;
-  BundleState state{report.camera.lens, {}, report.board_points};
-  const std::vector<BoardView> used = used_views(views, report, views.size());
-  for (const BoardView& view : used) arrays.push_back(make_arrays(view));
-  for (const ViewFit& view : report.views) {
-    if (view.used) state.cam_from_board.push_back(view.cam_from_board);
-  }
-  problem.views = arrays;
-  NormalEquations eq;
-  if (!linearize(problem, state, eq)) return {};
-  Eigen::MatrixXd S = eq.H.selfadjointView<Eigen::Lower>();
-  for (std::size_t k = 0; k < arrays.size(); ++k) {
-    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V[k]);
-    if (V.info() != Eigen::Success) return {};
-    S -= eq.coupling(k) * V.solve(eq.coupling(k).transpose());
-  }
+Eigen::MatrixXd sensitivity(const Board& board, const CalibrateConfig& config, std::span<const BoardView> views,
+                            const CalibrateReport& report, const LensSplit& split) {
+  const std::vector<ViewScore> scores = view_scores(board, config, views, report);
+  if (scores.empty()) return {};
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(report.model_cov.rows(), report.model_cov.rows());
+  for (const ViewScore& view : scores) S += view.information;
   const Eigen::MatrixXd of_free = S(split.free, split.free);
   const Eigen::VectorXd scale = of_free.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * of_free * scale.asDiagonal());
@@ -71,7 +40,7 @@ Eigen::MatrixXd sensitivity(const Board& board, CalibrateConfig config, std::spa
 
 /// The square of a board. The lens of a central camera is the same for all; the poses' distances follow it.
 Assumption square_of(const Board& board, const CalibrateConfig& config, std::span<const BoardView> views,
-                     const CalibrateReport& report, const Split& split) {
+                     const CalibrateReport& report, const LensSplit& split) {
   constexpr double ordinary = 2e-3;  // a printer's, of the length
   Assumption square{.name = "square_m", .value = board.square_m, .ordinary = ordinary * board.square_m};
   square.remedy = "measure the board: a port's gap follows the length of a square";
@@ -98,7 +67,7 @@ Assumption square_of(const Board& board, const CalibrateConfig& config, std::spa
 }
 
 /// The covariance of a lens that was given goes into what was estimated with it.
-void count_air(const Camera& air, const Eigen::MatrixXd& K, const Split& split, CalibrateReport& report) {
+void count_air(const Camera& air, const Eigen::MatrixXd& K, const LensSplit& split, CalibrateReport& report) {
   const Index num = report.camera.cov.rows();
   Eigen::MatrixXd given = Eigen::MatrixXd::Zero(num, num);
   const Index of_air = std::min(air.cov.rows(), num);
@@ -116,7 +85,7 @@ void count_air(const Camera& air, const Eigen::MatrixXd& K, const Split& split, 
 std::vector<Assumption> count_assumptions(const Board& board, const CalibrateConfig& config,
                                           std::span<const BoardView> views, const std::optional<Camera>& air,
                                           CalibrateReport& report) {
-  const Split split = split_of(report);
+  const LensSplit split = split_of(report);
   const Eigen::MatrixXd K = split.fixed.empty() ? Eigen::MatrixXd() : sensitivity(board, config, views, report, split);
   const bool air_has_cov = air && air->cov.size() > 0 && K.size() > 0;
   if (air_has_cov) count_air(*air, K, split, report);

@@ -37,7 +37,7 @@ TEST(CalibrationVerdict, CleanDataIsGood) {
     EXPECT_EQ(result.verdict.exit_code, ExitCode::ok);
     EXPECT_TRUE(result.verdict.to_add.empty()) << result.verdict.to_add;
     EXPECT_THAT(result.verdict.sentence, ::testing::StartsWith("Good: "));
-    EXPECT_EQ(result.verdict.checks.size(), 8u);
+    EXPECT_EQ(result.verdict.checks.size(), 9u);
     for (const Check& check : result.verdict.checks) EXPECT_EQ(check.state, State::good) << check.text;
   }
 }

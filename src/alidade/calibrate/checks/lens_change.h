@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/calibrate/calibrate.h"
+#include "alidade/calibrate/checks/view_scores.h"
+#include "alidade/estimation/verdict.h"
+
+namespace alidade {
+
+/// How the lens changes over the photos, in their order: a lens that warms up, an autofocus that creeps, a bump.
+struct LensChange {
+  enum class Course { drift, jump };
+  Course course = Course::drift;
+  std::string what;           ///< "focal length", "cx" or "cy".
+  double size = 0.0;          ///< From the first photo to the last; of the focal length relative, else [px].
+  double sigma = 0.0;         ///< Of it, by the scatter of the photos.
+  std::size_t at = 0;         ///< Of a jump: the first view after it, among those in use.
+  double moves = 0.0;         ///< Of the photo that is farthest from the stated lens, in σ of a parameter.
+  Eigen::VectorXd direction;  ///< Of all lens parameters, for a change of one.
+  bool is_proved = false;
+  double mean_square = 0.0;  ///< Of the photos' departures from the stated lens.
+};
+
+/// What is known of a change.
+struct LensChangeStudy {
+  /// Drift of the focal length over the photos, relative, that would be proved in 99 of 100 sets like this. None where
+  /// there are fewer than six photos.
+  std::optional<double> seen_from;
+  std::optional<LensChange> change;
+};
+
+/// The largest change of focal length, cx or cy over the photos: a score test of a drift and of a jump, by the noise
+/// of the corners and by the scatter of the photos, whichever is larger, which not more than one in fifty orders of the
+/// same photos shows as well: what the lens model does not explain is in all orders alike. A drift of the focal length
+/// is stated from where it is half proved. docs/maths/honest-sigma.md.
+[[nodiscard]] LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateReport& report);
+
+/// Whether the views before and after it, calibrated apart, differ by as much, within 3σ: where lens or board are not
+/// as they are modelled, scores are not proof.
+[[nodiscard]] bool is_confirmed(const LensChange& change, const Board& board, std::span<const BoardView> views,
+                                const CalibrateConfig& config, const CalibrateReport& report);
+
+/// Includes in σ of what was estimated that the lens of a photo departs from the stated one.
+void count_change(const LensChange& change, CalibrateReport& report);
+
+/// Adds the check "same lens" to the verdict. Of care where a change is proved and photos depart from the stated lens
+/// by more than two of its σ. `photos`: the names of those in use.
+void heed_change(const LensChangeStudy& study, std::span<const std::string> photos, Verdict& verdict);
+
+}  // namespace alidade

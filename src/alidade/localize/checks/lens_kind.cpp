@@ -156,6 +156,14 @@ bool may_be_of_lens(const Verdict& verdict) {
       verdict.checks, [&](const Check& check) { return check.state != State::good && of_lens.contains(check.name); });
 }
 
+/// Whether a lens of the given kind is estimated that leaves no other anything to explain.
+bool is_explained(const Localization& result) {
+  constexpr double noise_alone = 1.15;
+  constexpr std::size_t few = 20;
+  return result.given_camera && !result.is_of_images && result.nis_per_dof < noise_alone &&
+         few * result.num_gated < result.num_used;
+}
+
 std::string text_about(const OtherLensKind& other, const Lens& given) {
   const auto name_of = [](const Lens& lens) -> std::string {
     const std::string_view name = model_name(lens);
@@ -179,7 +187,7 @@ std::optional<OtherLensKind> other_lens_kind(std::span<const ObservationFrame> f
   constexpr double far_better = 0.8, least_gain = 100.0, well = 0.8;
   const std::string_view given_kind = model_name(result.camera.lens);
   if (frames.size() < enough || given_kind == "flat_port" || !may_be_of_lens(result.verdict)) return std::nullopt;
-  if (std::ranges::none_of(result.path, &PathStep::has_pose)) return std::nullopt;
+  if (std::ranges::none_of(result.path, &PathStep::has_pose) || is_explained(result)) return std::nullopt;
   frames = frames.first(std::min(frames.size(), most));
   const Camera& as_given = result.given_camera ? *result.given_camera : result.camera;
   const Camera given = without_cov(as_given, as_given.lens);

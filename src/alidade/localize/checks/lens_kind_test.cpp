@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <string>
+
 #include "alidade/localize.h"
 #include "alidade/testing/hover.h"
 
@@ -80,6 +83,38 @@ TEST(LensKind, TheRightKindIsNotDoubted) {
           << static_cast<int>(lens) << ", " << focal << ": " << result.verdict.sentence;
     }
   }
+}
+
+/// Of everything but the focal length, and a path with that: the estimate is what it was, within σ.
+TEST(LensKind, AWrongFocalLengthIsEstimatedAndNamed) {
+  for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye}) {
+    for (const double focal : {0.75, 1.34}) {
+      const HoverRun run = brief_run(lens, 4);
+      const Localization result = located(run, sure(run.camera, focal));
+      const std::string what = (lens == HoverLens::brown ? "Brown, " : "fisheye, ") + std::to_string(focal);
+      ASSERT_TRUE(result.given_camera) << what << ": " << result.verdict.sentence;
+      EXPECT_TRUE(names(result, focal < 1.0 ? "focal length +3" : "focal length -2"))
+          << what << ": " << result.verdict.sentence;
+      const double estimated = params(result.camera.lens)[0], sigma = result.sigma_lens[0];
+      EXPECT_LT(std::abs(estimated - params(run.camera.lens)[0]), 4.0 * sigma) << what;
+      EXPECT_LT(sigma, 0.02 * estimated) << what;
+      EXPECT_LT(20 * result.num_gated, result.num_used) << what;
+      double nees = 0.0;
+      for (std::size_t k = 0; k < run.truth.size(); ++k)
+        nees += testing::pose_nees(result.path[k], run.truth[k].world_from_cam) / static_cast<double>(run.truth.size());
+      EXPECT_LT(nees, 3.0) << what;  // errors of neighbouring frames are nearly one
+    }
+  }
+}
+
+/// A focal length as wrong as its covariance says is counted, and contradicts nothing.
+TEST(LensKind, AFocalLengthWithinItsSigmaIsLeft) {
+  const HoverRun run = brief_run(HoverLens::brown, 5);
+  Camera camera = sure(run.camera, 1.03);
+  camera.cov.diagonal().head<2>().setConstant(std::pow(0.03 * params(camera.lens)[0], 2));
+  EXPECT_FALSE(located(run, camera).given_camera);
+  camera.cov.diagonal().head<2>().setConstant(0.01);
+  EXPECT_TRUE(located(run, camera).given_camera);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "alidade/localize/path/path_error.h"
 
@@ -71,13 +72,22 @@ bool is_of_targets_points(const GivenNumber& given) {
   return given.name == "shape of the target" || given.name == "speed of the target" || given.name == "readout";
 }
 
+std::size_t num_known_fit(const SmoothedPath& smoothed, std::span<const MapPoint> map) {
+  std::set<long> known;
+  for (const MapPoint& point : map)
+    if (point.is_known) known.insert(point.id);
+  return static_cast<std::size_t>(
+      std::ranges::count_if(smoothed.residuals, [&](const PlacedResidual& each) { return known.contains(each.id); }));
+}
+
 }  // namespace
 
 void take_over(const SmoothedPath& smoothed, Localization& result) {
   result.is_smoothed = true;
   result.given = smoothed.given;
+  const bool is_other_path = result.num_restarts > 0 || (smoothed.is_lens_freed && !result.is_of_images);
+  if (result.is_of_images || is_other_path) result.radial = smoothed.radial;
   if (result.is_of_images) {
-    result.radial = smoothed.radial;
     std::erase_if(result.given,
                   is_of_targets_points);  // patches of four corners change as they are seen from elsewhere
   }
@@ -92,9 +102,10 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
   }
   result.camera = smoothed.camera;
   result.sigma_lens = smoothed.sigma_lens;
-  if (result.num_restarts > 0) {  // what the filter rejected before it began again is no longer rejected
+  if (is_other_path) {  // what the filter rejected before it began again, or by another lens, is no longer rejected
     result.num_used = smoothed.residuals.size();
     result.num_gated = smoothed.num_dropped;
+    result.num_known_gated = result.num_known - std::min(result.num_known, num_known_fit(smoothed, result.map));
     result.nis_per_dof = smoothed.chi2_per_dof;
   }
   for (std::size_t i = 0; i < smoothed.ids.size(); ++i) {

@@ -23,6 +23,7 @@ class ObservationRecord {
  public:
   /// The path begins at this frame, for the first time or again.
   void begin(std::size_t frame);
+  [[nodiscard]] std::size_t num_begun() const { return num_begun_; }
   [[nodiscard]] std::size_t begun() const { return last_begun_; }  ///< The last time.
   /// A point that comes back was born when it entered first: its range now is what it said before.
   void entered(std::size_t frame, long id, const RangePrior& prior, bool comes_back) {

@@ -53,7 +53,19 @@ void PathSmoother::free_lens() {
   links_.clear();
 }
 
-/// Whether the lens's parameters together explain of what is left over far more than chance would.
+/// What the best of the causes that are tested beside the lens explains of what is left over.
+double PathSmoother::best_cause(const Asked& all) const {
+  const Eigen::Index causes = causes_at_ - lens_at_;
+  double best = 0.0;
+  for (const auto& [first, num] : {std::pair{shape_cause, 1}, {speed_cause, 3}, {readout_cause, 1}}) {
+    const Eigen::MatrixXd information = all.information.block(causes + first, causes + first, num, num);
+    const Eigen::VectorXd score = all.score.segment(causes + first, num);
+    if (information.diagonal().minCoeff() > 0.0) best = std::max(best, score.dot(information.ldlt().solve(score)));
+  }
+  return best;
+}
+
+/// Whether the lens's parameters together explain of what is left over far more than chance and their covariance would.
 bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   if (num_estimated_ > 0) return false;
   const std::vector<std::string> names = param_names(problem_.camera.lens);
@@ -61,14 +73,17 @@ bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   std::vector<Eigen::Index> open;
   for (const OpenParam& each : open_params)
     if (const auto at = std::ranges::find(names, each.name); at != names.end()) open.push_back(at - names.begin());
-  const Eigen::MatrixXd information = all.information(open, open);
+  const Eigen::MatrixXd information = all.information(open, open), known = considered_cov()(open, open);
   const Eigen::VectorXd score = all.score(open);
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(information);
   const double num_left =
       2.0 * static_cast<double>(observations_.size()) - 6.0 * static_cast<double>(state_.poses.size());
   const double noise = std::max(1.0, system.observed_cost / std::max(num_left, 1.0));
+  const auto explained = [](const Eigen::VectorXd& of, const Eigen::MatrixXd& variance) {
+    return of.dot(variance.ldlt().solve(of));
+  };
   constexpr double far_more = 60.0;
-  return score.dot(ldlt.solve(score)) > far_more * noise;
+  if (!(explained(score, noise * information + information * known * information) > far_more)) return false;
+  return !problem_.compares_causes || explained(score, information) > best_cause(all);
 }
 
 }  // namespace alidade

@@ -144,6 +144,10 @@ bool PathSmoother::settle_all() {
 }
 
 std::optional<SmoothedPath> PathSmoother::solve() {
+  if (problem_.freed_lens) {
+    state_.camera.lens = *problem_.freed_lens;
+    free_lens();
+  }
   for (const UsedObservation& observation : problem_.observations) {
     const auto point = index_of_.find(observation.id);
     if (observation.fits_start && point != index_of_.end() &&

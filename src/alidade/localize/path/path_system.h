@@ -108,6 +108,7 @@ class PathSmoother {
     Eigen::MatrixXd information;
     Eigen::VectorXd score;
   };
+  [[nodiscard]] double best_cause(const Asked& all) const;
   /// path_imu.cpp.
   void begin_imu();
   void leave_out_blows();

@@ -2,8 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <map>
 #include <optional>
+#include <set>
 #include <unordered_map>
+
+#include "alidade/localize/filter/observation_record.h"
 
 namespace alidade {
 namespace {
@@ -87,7 +91,62 @@ std::optional<PlacedPoint> placed_by(const SmoothedPath& smoothed, std::span<con
   return placed;
 }
 
+/// The observations of all points of a problem, and of those that no position fits, as they fit a path.
+std::vector<UsedObservation> all_observations(const SmoothedPath& smoothed, std::span<const ObservationFrame> frames,
+                                              const SmootherProblem& problem, const std::set<long>& misfits) {
+  const double gate = 4.0 * problem.filter.gate;  // poses and positions give way when all are solved for together
+  std::vector<UsedObservation> all;
+  for (std::size_t k = 0; k < smoothed.world_from_cam.size(); ++k) {
+    const Rigid3 cam_from_world = smoothed.world_from_cam[k].inverse();
+    for (const FeatureObservation& each : frames[k].observations) {
+      const auto point = std::ranges::lower_bound(problem.points, each.id, {}, &SmootherPoint::id);
+      const bool is_there = point != problem.points.end() && point->id == each.id;
+      if (!is_there && !misfits.contains(each.id)) continue;
+      const double sigma_px = each.sigma_px > 0.0 ? each.sigma_px : problem.filter.sigma_px;
+      const auto px = is_there ? project(smoothed.camera, cam_from_world * point->point_in_world) : std::nullopt;
+      const bool fits = px && (*px - each.px).squaredNorm() <= gate * sigma_px * sigma_px;
+      all.push_back({k, each.id, each.px, sigma_px, fits});
+    }
+  }
+  return all;
+}
+
+/// Points that most of their observations do not fit are where another path, or lens, had them.
+void drop_misplaced(const SmoothedPath& smoothed, std::span<const ObservationFrame> frames, SmootherProblem& problem) {
+  std::unordered_map<long, std::size_t> num_fit, num_seen;
+  for (const PlacedResidual& residual : smoothed.residuals) ++num_fit[residual.id];
+  for (std::size_t k = 0; k < smoothed.world_from_cam.size(); ++k)
+    for (const FeatureObservation& each : frames[k].observations) ++num_seen[each.id];
+  std::erase_if(problem.points, [&](const SmootherPoint& point) {
+    return !point.given_in_world && 2 * num_fit[point.id] < num_seen[point.id];
+  });
+}
+
 }  // namespace
+
+void add_remaining(const SmoothedPath& smoothed, std::span<const ObservationFrame> frames, SmootherProblem& problem) {
+  drop_misplaced(smoothed, frames, problem);
+  std::map<long, std::vector<Look>> looks;
+  for (std::size_t k = 0; k < smoothed.world_from_cam.size(); ++k)
+    for (const FeatureObservation& each : frames[k].observations)
+      if (!std::ranges::binary_search(problem.points, each.id, {}, &SmootherPoint::id))
+        looks[each.id].push_back({k, each.px, each.sigma_px > 0.0 ? each.sigma_px : problem.filter.sigma_px});
+  std::vector<SmootherPoint> added;
+  std::set<long> misfits;
+  for (const auto& [id, of_point] : looks) {
+    if (of_point.size() < min_looks || !nearest_to_rays(smoothed, of_point)) continue;
+    const auto placed = placed_by(smoothed, of_point, problem.filter.gate);
+    if (placed)
+      added.push_back({.id = id, .point_in_world = placed->point_in_world, .given_in_world = {}, .range = {}});
+    else
+      misfits.insert(id);
+  }
+  if (static_cast<double>(problem.points.size() + added.size()) > max_points_at_once(smoothed.world_from_cam.size()))
+    return;
+  problem.points.insert(problem.points.end(), added.begin(), added.end());
+  std::ranges::sort(problem.points, {}, &SmootherPoint::id);
+  problem.observations = all_observations(smoothed, frames, problem, misfits);
+}
 
 void locate_remaining(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
                       double sigma_px, double gate, std::vector<MapPoint>& map) {

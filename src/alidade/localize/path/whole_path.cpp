@@ -17,6 +17,7 @@ namespace {
 void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
                   Localization& result) {
   std::vector<std::size_t> num_fit(result.path.size(), 0);
+  result.num_unexplained = 0;
   for (const PlacedResidual& residual : smoothed.residuals) ++num_fit[first_frame + residual.frame];
   for (std::size_t k = first_frame; k < result.path.size(); ++k) {
     PathStep& step = result.path[k];
@@ -82,6 +83,7 @@ void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& probl
     problem.world_from_cam[k] = smoothed.world_from_cam[k];
     problem.world_from_cam[k].translation *= scale;
   }
+  if (smoothed.is_lens_freed) problem.freed_lens = smoothed.camera.lens;
   std::vector<SmootherPoint> points;
   for (SmootherPoint& point : problem.points) {
     const auto at = std::ranges::lower_bound(smoothed.ids, point.id);
@@ -90,6 +92,34 @@ void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& probl
     points.push_back(point);
   }
   problem.points = std::move(points);
+}
+
+/// Whether a lens is estimated, and much that the filter saw by another one does not fit it.
+bool has_other_lens(const SmoothedPath& smoothed, const SmootherProblem& problem) {
+  constexpr std::size_t few = 20;
+  return smoothed.is_lens_freed && few * smoothed.num_dropped > problem.observations.size();
+}
+
+/// After a new beginning the filter knows few depths, often those of the target alone, which a path by a wrong lens
+/// fits as well: it is solved again with all that it sees, and with what fits another lens where that is estimated.
+/// Where that does not settle, nothing is explained.
+void solve_with_remaining(std::span<const ObservationFrame> frames, SmootherProblem& given, SmoothedPath& smoothed,
+                          Localization& result) {
+  constexpr int most = 3;
+  for (int i = 0; i < most; ++i) {
+    SmootherProblem problem = given;
+    begin_at(smoothed, 1.0, problem);
+    add_remaining(smoothed, frames.subspan(given.first_frame), problem);
+    problem.frees_lens = true;
+    Localization again = result;
+    auto with_all = smooth(problem, frames, again);
+    if (!with_all && i == 0) result.num_unexplained = result.path.size();
+    if (!with_all) return;
+    result = std::move(again);
+    smoothed = std::move(*with_all);
+    given = std::move(problem);
+    if (!has_other_lens(smoothed, given)) return;
+  }
 }
 
 /// Each point's distance from where it was first seen is believed to be what it is now, so vaguely that all of them
@@ -249,9 +279,13 @@ std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEn
                                                            engine.best(), recording.gone, engine.start_without_target(),
                                                            recording.period_s, !recording.number_of.empty());
   if (!problem) return std::nullopt;
-  problem->frees_lens = result.is_of_images;
+  const bool lacks_points = !result.is_of_images && recording.record.num_begun() > 1;
+  problem->frees_lens = !lacks_points;
+  problem->compares_causes = !result.is_of_images;
   auto smoothed = smooth_with_loops(recording, *problem, kept);
   if (!smoothed) return std::nullopt;
+  if (lacks_points || (!result.is_of_images && has_other_lens(*smoothed, *problem)))
+    solve_with_remaining(frames.frames(), *problem, *smoothed, kept);
   const double by_sensors = solve_in_metres(recording, config, *problem, *smoothed, kept);
   const double scale = by_sensors * solve_with_imu(recording, config, *problem, *smoothed, kept);
   if (kept.imu) kept.imu->scale *= by_sensors;

@@ -45,11 +45,12 @@ std::optional<SmoothedPath> best_path(const SmootherProblem& problem) {
   return is_better ? std::move(other) : std::move(smoothed);
 }
 
-/// The path of `result` smoothed. None, and no change, where that does not settle.
+/// The path of `result` smoothed. None, and no change, where that does not settle, or on a path that next to nothing
+/// fits.
 std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<const ObservationFrame> frames,
                                    Localization& result) {
   auto smoothed = best_path(problem);
-  if (!smoothed) return std::nullopt;
+  if (!smoothed || smoothed->residuals.size() < min_observations * smoothed->world_from_cam.size()) return std::nullopt;
   result.residuals = smoothed->structure;
   for (std::size_t k = 0; k < smoothed->cov.size(); ++k) {
     PathStep& step = result.path[problem.first_frame + k];

@@ -73,7 +73,8 @@ bool is_solved_again(const Localization& report) {
 /// Again and again without being lost: no path explains what this camera saw of this target.
 State restarts_state(const Localization& report) {
   if (is_solved_again(report)) return State::good;
-  if (!report.is_of_images) return State::care;  // mismatches in a table may look like another pose for a frame
+  // Mismatches in a table may look like another pose for a frame.
+  if (!report.is_of_images && (report.is_smoothed || !(report.nis_per_dof > good_nis_high))) return State::care;
   std::size_t num_again = 0;
   for (std::size_t i = 1; i < report.path.size(); ++i)
     num_again += report.path[i].event == FrameEvent::restarted && report.path[i - 1].event != FrameEvent::predicted;
@@ -134,11 +135,17 @@ void add_given(const Localization& report, Verdict& verdict) {
   if (worst != nullptr && std::abs(worst->asked * worst->moves) > min_move && std::abs(worst->z) > care_z)
     verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z), cause_text(*worst),
                               std::abs(worst->z), care_z, "σ", "path"});
-  if (report.given_camera)
+  if (report.given_camera) {
+    constexpr double much = 0.2;
+    const double gated = share(report.num_gated, report.num_used + report.num_gated);
+    const bool is_no_cause = !report.is_of_images && (gated > much || report.nis_per_dof > good_nis_high);
     verdict.checks.push_back(
-        {"camera", State::care,
-         "the lens is not as given: it is estimated with the path, " + lens_changes(report) + "; camera.yaml has it",
-         1.0, 0.0, "", "path"});
+        {"camera", is_no_cause ? State::bad : State::care,
+         "the lens is not as given: it is estimated with the path, " + lens_changes(report) +
+             (is_no_cause ? ", and does not explain the observations: something else is not as given"
+                          : "; camera.yaml has it"),
+         gated, much, "1", "path"});
+  }
   constexpr double care_pull = 3.0;
   if (report.lens_pull > care_pull)
     verdict.checks.push_back({"camera", State::care,

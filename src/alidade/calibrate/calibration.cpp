@@ -46,8 +46,7 @@ std::vector<std::string> used_photos(const Calibration& result) {
 /// A change of the lens over the photos that calibrations of its parts confirm.
 LensChangeStudy find_change(const Calibration& result) {
   LensChangeStudy study = lens_change(view_scores(result.board, result.config, result.board_views, result), result);
-  if (study.change && study.change->is_proved &&
-      !is_confirmed(*study.change, result.board, result.board_views, result.config, result))
+  if (study.change && !is_confirmed(*study.change, result.board, result.board_views, result.config, result))
     study.change.reset();
   return study;
 }

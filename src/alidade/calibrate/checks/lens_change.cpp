@@ -271,7 +271,9 @@ LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateRep
       const bool is_focal_drift = change.what == focal_length && course == Course::drift;
       constexpr double at_99 = 2.33;
       if (is_focal_drift) study.seen_from = (proved_from(found) + at_99) * change.sigma;
-      const bool is_half_proved = is_focal_drift && sigmas > half_proved_sigmas;
+      constexpr double most_unproved = 0.01;  // what warming up or a creeping focus comes to
+      const bool is_half_proved =
+          is_focal_drift && sigmas > half_proved_sigmas && std::abs(change.size) < most_unproved;
       // A proved one goes before one that is half proved.
       const double weight = sigmas * (change.is_proved ? 100.0 : is_half_proved ? 1.0 : 0.0);
       if (weight > largest) {

@@ -260,9 +260,10 @@ void GuidePage::show_result(ExitCode code) {
 void throw_if_terminated(const live::KeptPhotos& kept) {
   if (interrupting_signal() != SIGTERM && interrupting_signal() != SIGHUP) return;
   if (kept.photos().empty()) throw Interrupted();
-  const std::string folder = kept.folder().parent_path().string();
-  throw Interrupted(fmt::format("interrupted; {} photos are in {}: go on with --resume {}", kept.photos().size(),
-                                kept.folder().string(), folder));
+  const std::size_t num = kept.photos().size();
+  throw Interrupted(fmt::format("interrupted; {} {} in {}: go on with --resume {}", num,
+                                num == 1 ? "photo is" : "photos are", kept.folder().string(),
+                                kept.folder().parent_path().string()));
 }
 
 }  // namespace alidade::cli

@@ -104,14 +104,14 @@ bool has_other_lens(const SmoothedPath& smoothed, const SmootherProblem& problem
 /// After a new beginning the filter knows few depths, often those of the target alone, which a path by a wrong lens
 /// fits as well: it is solved again with all that it sees, and with what fits another lens where that is estimated.
 /// Where that does not settle, nothing is explained.
-void solve_with_remaining(std::span<const ObservationFrame> frames, SmootherProblem& given, SmoothedPath& smoothed,
-                          Localization& result) {
+void solve_with_remaining(std::span<const ObservationFrame> frames, bool frees_lens, SmootherProblem& given,
+                          SmoothedPath& smoothed, Localization& result) {
   constexpr int most = 3;
   for (int i = 0; i < most; ++i) {
     SmootherProblem problem = given;
     begin_at(smoothed, 1.0, problem);
     add_remaining(smoothed, frames.subspan(given.first_frame), problem);
-    problem.frees_lens = true;
+    problem.frees_lens = frees_lens;
     Localization again = result;
     auto with_all = smooth(problem, frames, again);
     if (!with_all && i == 0) result.num_unexplained = result.path.size();
@@ -281,12 +281,14 @@ std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEn
                                                            recording.period_s, !recording.number_of.empty());
   if (!problem) return std::nullopt;
   const bool lacks_points = !result.is_of_images && recording.record.num_begun() > 1;
-  problem->frees_lens = !lacks_points;
+  // Whoever asks for less of the lens gets the path by that.
+  const bool frees_lens = result.is_of_images || config.distortion == DistortionVariant::full;
+  problem->frees_lens = frees_lens && !lacks_points;
   problem->compares_causes = !result.is_of_images;
   auto smoothed = smooth_with_loops(recording, *problem, kept);
   if (!smoothed) return std::nullopt;
   if (lacks_points || (!result.is_of_images && has_other_lens(*smoothed, *problem)))
-    solve_with_remaining(frames.frames(), *problem, *smoothed, kept);
+    solve_with_remaining(frames.frames(), frees_lens, *problem, *smoothed, kept);
   const double by_sensors = solve_in_metres(recording, config, *problem, *smoothed, kept);
   const double scale = by_sensors * solve_with_imu(recording, config, *problem, *smoothed, kept);
   if (kept.imu) kept.imu->scale *= by_sensors;

@@ -105,7 +105,9 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
   if (is_other_path) {  // what the filter rejected before it began again, or by another lens, is no longer rejected
     result.num_used = smoothed.residuals.size();
     result.num_gated = smoothed.num_dropped;
-    result.num_known_gated = result.num_known - std::min(result.num_known, num_known_fit(smoothed, result.map));
+    // Where some frames were solved for, the others' observations have no residuals: the filter's count stays.
+    if (result.smoothed_every == 1)
+      result.num_known_gated = result.num_known - std::min(result.num_known, num_known_fit(smoothed, result.map));
     result.nis_per_dof = smoothed.chi2_per_dof;
   }
   for (std::size_t i = 0; i < smoothed.ids.size(); ++i) {

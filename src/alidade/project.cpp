@@ -121,10 +121,6 @@ void heed_other_camera(const ProjectConfig& config, const Camera& camera, Verdic
   heed(check, "use " + (config.own_camera_name.empty() ? "that camera" : config.own_camera_name), verdict);
 }
 
-bool is_in_image(const Camera& camera, const Eigen::Vector2d& px) {
-  return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
-}
-
 /// What the image shows: a lens is known where photos calibrated it, and its polynomials are anything beyond.
 Check image_check(const Camera& camera, const std::vector<ProjectedReading>& projected) {
   Check check{.name = "in the image", .text = "all points are in the image"};
@@ -162,9 +158,10 @@ Check image_check(const Rig& rig, const std::vector<HeadProjection>& heads) {
   return check;
 }
 
-/// By how much of the pixel's own σ the lens bends over σ of the point; infinite where a point within σ is not seen.
-double bend_of(const Camera& camera, const ProjectedReading& one) {
-  constexpr double small_px = 1.0;  // of a move: what it bends is less
+/// How far the projection is from linear within σ of the point, over σ of the pixel; infinite where a point within σ is
+/// not seen.
+double nonlinearity_of(const Camera& camera, const ProjectedReading& one) {
+  constexpr double small_px = 1.0;  // of a move: its curvature is less
   const SymmetricEigen3 axes = symmetric_eigen3(one.point.cov);
   double worst = 0.0;
   for (int i = 0; i < 3 && one.pixel; ++i) {
@@ -172,23 +169,23 @@ double bend_of(const Camera& camera, const ProjectedReading& one) {
     const auto ahead = project(camera, one.point.point_in_cam + step);
     const auto back = project(camera, one.point.point_in_cam - step);
     if (!ahead || !back) return std::numeric_limits<double>::infinity();
-    const double half = 0.5 * (*ahead - *back).norm(), bent = (0.5 * (*ahead + *back) - one.pixel->px).norm();
+    const double half = 0.5 * (*ahead - *back).norm(), curved = (0.5 * (*ahead + *back) - one.pixel->px).norm();
     const double linear = (project_with_jacobians(camera, one.point.point_in_cam)->J_px_point * step).norm();
     if (std::max(half, linear) > small_px)
-      worst = std::max(worst, std::max(bent, std::abs(half - linear)) / std::max(linear, small_px));
+      worst = std::max(worst, std::max(curved, std::abs(half - linear)) / std::max(linear, small_px));
   }
   return worst;
 }
 
-/// σ of a pixel is propagated linearly: it says nothing where the lens bends within it.
+/// σ of a pixel is propagated linearly: it says nothing where the projection is not linear within it.
 Check linear_check(const Beam& beam, const Camera& camera, const std::vector<ProjectedReading>& projected) {
   Check check{.name = "linear", .text = "σ is small enough to be propagated linearly", .limit = 0.3};
   check.value = std::sqrt(std::max(0.0, beam.cov.block<2, 2>(beam_direction_param, beam_direction_param).trace()));
   double at_m = projected.front().range_m;  // of a direction on a sphere
   for (const ProjectedReading& one : projected) {
-    const double bend = bend_of(camera, one);
-    if (!(bend > check.value)) continue;
-    check.value = bend;
+    const double nonlinearity = nonlinearity_of(camera, one);
+    if (!(nonlinearity > check.value)) continue;
+    check.value = nonlinearity;
     at_m = one.range_m;
   }
   if (check.value <= check.limit) return check;

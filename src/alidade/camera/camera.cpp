@@ -114,6 +114,10 @@ std::vector<std::optional<ObservationRay>> observation_rays(const Camera& camera
       camera.lens);
 }
 
+bool is_in_image(const Camera& camera, const Eigen::Vector2d& px) {
+  return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
+}
+
 std::optional<ObservationRay> observation_ray(const Camera& camera, const Eigen::Vector2d& px) {
   return observation_rays(camera, {&px, 1}).front();
 }

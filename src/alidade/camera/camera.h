@@ -57,6 +57,8 @@ struct Camera {
 [[nodiscard]] std::optional<Eigen::Vector3d> unproject(const Camera& camera, const Eigen::Vector2d& px);
 [[nodiscard]] std::vector<std::optional<Eigen::Vector3d>> unproject(const Camera& camera,
                                                                     std::span<const Eigen::Vector2d> pixels);
+/// Whether a pixel is in the image; integers are at the centres of pixels, so that it begins at -0.5.
+[[nodiscard]] bool is_in_image(const Camera& camera, const Eigen::Vector2d& px);
 /// Origin and direction of what a pixel sees, for any lens.
 [[nodiscard]] std::optional<ObservationRay> observation_ray(const Camera& camera, const Eigen::Vector2d& px);
 [[nodiscard]] std::vector<std::optional<ObservationRay>> observation_rays(const Camera& camera,

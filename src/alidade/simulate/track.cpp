@@ -158,10 +158,6 @@ Eigen::Vector3d circle_offset(double radius_m, double period_s, double t_s) {
   return radius_m * Vector3d(std::cos(angle) - 1.0, std::sin(angle), 0.0);
 }
 
-bool is_in_image(const Camera& camera, const Eigen::Vector2d& px) {
-  return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
-}
-
 Eigen::Vector3d manoeuvre_position(double t_s) {
   Vector3d position(0.2, -0.2, 3.0), velocity(1.5, 0.0, 0.0);
   double now_s = 0.0;

@@ -69,8 +69,6 @@ struct SimulatedObservation {
 /// From the start of a circle in a plane of constant z, which begins at +x of its centre.
 [[nodiscard]] Eigen::Vector3d circle_offset(double radius_m, double period_s, double t_s);
 
-[[nodiscard]] bool is_in_image(const Camera& camera, const Eigen::Vector2d& px);
-
 /// The manoeuvre of scenario C: 11 s between 0.9 and 3.9 m, up to 1.5 m/s and 6 m/s².
 [[nodiscard]] Eigen::Vector3d manoeuvre_position(double t_s);
 

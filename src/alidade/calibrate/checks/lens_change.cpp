@@ -24,7 +24,7 @@ constexpr double care_sigmas = 2.0;
 /// proved the first photo is off by 5σ already.
 constexpr double half_proved_sigmas = 2.5;
 constexpr std::string_view focal_length = "focal length";
-using Course = LensChange::Course;
+using Profile = LensChange::Profile;
 
 /// What could change, as a direction in the lens parameters, and what each view says of it: its score γ, its
 /// information α and what of that the estimated parameters share, b, in units in which their information is 1.
@@ -93,7 +93,7 @@ std::vector<Direction> directions_of(std::span<const ViewScore> views, const Cal
           direction_of("cx", unit(2, 1.0), views, all), direction_of("cy", unit(3, 1.0), views, all)};
 }
 
-/// Sums over the photos' course t: Σ t γ, Σ t² α, Σ t α and Σ t b.
+/// Sums over the photos' profile t: Σ t γ, Σ t² α, Σ t α and Σ t b.
 struct Sums {
   double score = 0.0, squares = 0.0, information = 0.0;
   VectorXd shared;
@@ -106,27 +106,27 @@ struct Sums {
   }
 };
 
-/// Score of a course about its mean, and its information once the estimated parameters follow.
-struct CourseScore {
+/// Score of a profile about its mean, and its information once the estimated parameters follow.
+struct ProfileScore {
   double score = 0.0, information = 0.0, mean = 0.0;
 
   [[nodiscard]] double chi2() const { return information > 0.0 ? score * score / information : 0.0; }
 };
 
-CourseScore score_of(const Direction& direction, const Sums& sums, const Sums& total) {
-  CourseScore of{.mean = sums.information / total.information};
+ProfileScore score_of(const Direction& direction, const Sums& sums, const Sums& total) {
+  ProfileScore of{.mean = sums.information / total.information};
   of.score = sums.score - of.mean * total.score;
   const double whole = sums.squares - of.mean * sums.information;
   of.information = whole - (sums.shared - of.mean * total.shared).squaredNorm();
-  constexpr double nothing_left = 1e-9;  // of it: the course is what the estimated parameters do
+  constexpr double nothing_left = 1e-9;  // of it: the profile is what the estimated parameters do
   if (!(of.information > nothing_left * direction.information.sum())) of.information = 0.0;
   return of;
 }
 
-/// A course of one direction over the photos, and how much of the residuals it explains.
+/// A profile of one direction over the photos, and how much of the residuals it explains.
 struct Found {
   const Direction* direction = nullptr;
-  Course course = Course::drift;
+  Profile profile = Profile::drift;
   std::size_t at = 0;
   double chi2 = 0.0;  ///< Of residuals in pixels.
 };
@@ -139,22 +139,22 @@ double drift_at(std::size_t place, std::size_t num_views) {
 }
 
 /// The drift, or the jump that explains most, the views standing in that order.
-Found best_course(const Direction& direction, Course course, const std::vector<Index>& order) {
+Found best_profile(const Direction& direction, Profile profile, const std::vector<Index>& order) {
   const std::size_t n = order.size(), least = least_beside(n), stride = 1 + n / 60;
   const Sums none{.shared = VectorXd::Zero(direction.shared.rows())};
   Sums total = none, sums = none;
   for (std::size_t i = 0; i < n; ++i) {
     total.add(direction, order[i], 1.0);
-    if (course == Course::drift) sums.add(direction, order[i], drift_at(i, n));
+    if (profile == Profile::drift) sums.add(direction, order[i], drift_at(i, n));
   }
-  Found best{&direction, course};
+  Found best{&direction, profile};
   if (!(total.information > 0.0)) return best;
-  if (course == Course::drift) best.chi2 = score_of(direction, sums, total).chi2();
-  for (std::size_t i = n; course == Course::jump && i-- > least;) {
+  if (profile == Profile::drift) best.chi2 = score_of(direction, sums, total).chi2();
+  for (std::size_t i = n; profile == Profile::jump && i-- > least;) {
     sums.add(direction, order[i], 1.0);
     if (n - i < least || i % stride != 0) continue;
     const double chi2 = score_of(direction, sums, total).chi2();
-    if (chi2 > best.chi2) best = {&direction, course, i, chi2};
+    if (chi2 > best.chi2) best = {&direction, profile, i, chi2};
   }
   return best;
 }
@@ -167,18 +167,18 @@ bool is_of_the_order(const Found& found, std::vector<Index> order) {
   int as_large = 0;
   for (int trial = 0; trial < orders && as_large <= at_most; ++trial) {
     for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[bits() % i]);
-    as_large += best_course(*found.direction, found.course, order).chi2 >= alike * found.chi2 ? 1 : 0;
+    as_large += best_profile(*found.direction, found.profile, order).chi2 >= alike * found.chi2 ? 1 : 0;
   }
   return as_large <= at_most;
 }
 
-/// The courses' values, view by view, about their mean.
+/// The profiles' values, view by view, about their mean.
 VectorXd values_of(const Found& found, Index num_views) {
   VectorXd t(num_views);
   for (Index k = 0; k < num_views; ++k) {
     const auto place = static_cast<std::size_t>(k);
-    t[k] = found.course == Course::drift ? drift_at(place, static_cast<std::size_t>(num_views))
-                                         : (place >= found.at ? 1.0 : 0.0);
+    t[k] = found.profile == Profile::drift ? drift_at(place, static_cast<std::size_t>(num_views))
+                                           : (place >= found.at ? 1.0 : 0.0);
   }
   const VectorXd& information = found.direction->information;
   return t.array() - t.dot(information) / information.sum();
@@ -203,7 +203,7 @@ LensChange change_of(const Found& found, const Estimated& all, const CalibrateRe
   const VectorXd t = values_of(found, direction.score.size());
   const double information =
       (t.array().square() * direction.information.array()).sum() - (direction.shared * t).squaredNorm();
-  LensChange change{.course = found.course, .what = direction.what, .at = found.at, .direction = direction.of_lens};
+  LensChange change{.profile = found.profile, .what = direction.what, .at = found.at, .direction = direction.of_lens};
   change.size = -t.dot(direction.score) / information;
   change.sigma = std::max(report.noise_px / std::sqrt(information), sigma_of(t, found, all, change.size, information));
   change.mean_square = change.size * change.size * t.squaredNorm() / static_cast<double>(t.size());
@@ -218,7 +218,7 @@ LensChange change_of(const Found& found, const Estimated& all, const CalibrateRe
 /// From how many σ on it is no chance: by these one clean set in 350 drifts, and one in 500 jumps somewhere. The focal
 /// length is what drifts most, and matters most.
 double proved_from(const Found& found) {
-  if (found.course == Course::jump) return 4.0;
+  if (found.profile == Profile::jump) return 4.0;
   return found.direction->what == focal_length ? 3.1 : 3.5;
 }
 
@@ -238,7 +238,7 @@ Check check_of(const LensChangeStudy& study, std::span<const std::string> photos
     return check;
   }
   const LensChange& change = *study.change;
-  const bool drifts = change.course == Course::drift;
+  const bool drifts = change.profile == Profile::drift;
   check.value = change.moves;
   check.state = change.is_proved && change.moves > care_sigmas ? State::care : State::good;
   check.text = change.what + (drifts ? " drifts by " : " jumps by ") + sized(change, change.size) + " ± " +
@@ -260,15 +260,15 @@ LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateRep
   std::iota(order.begin(), order.end(), Index{0});
   double largest = 0.0;
   for (const Direction& direction : directions) {
-    for (const Course course : {Course::drift, Course::jump}) {
-      const Found found = best_course(direction, course, order);
+    for (const Profile profile : {Profile::drift, Profile::jump}) {
+      const Found found = best_profile(direction, profile, order);
       if (!(found.chi2 > 0.0)) continue;
       LensChange change = change_of(found, *all, report);
       const double most = 0.05 * (direction.what == focal_length ? 1.0 : report.camera.width_px);
       if (std::abs(change.size) > most) continue;  // no lens does: another camera, or what is not modelled
       const double sigmas = std::abs(change.size) / change.sigma;
       change.is_proved = sigmas > proved_from(found) && is_of_the_order(found, order);
-      const bool is_focal_drift = change.what == focal_length && course == Course::drift;
+      const bool is_focal_drift = change.what == focal_length && profile == Profile::drift;
       constexpr double at_99 = 2.33;
       if (is_focal_drift) study.seen_from = (proved_from(found) + at_99) * change.sigma;
       constexpr double most_unproved = 0.01;  // what warming up or a creeping focus comes to
@@ -309,7 +309,7 @@ bool is_confirmed(const LensChange& change, const Board& board, std::span<const 
   if (!is_central(report.camera.lens)) return true;
   const CalibrateConfig simple = with_distortion_fixed(config, report);
   const std::vector<BoardView> used = used_views(views, report, views.size());
-  const bool jumps = change.course == Course::jump;
+  const bool jumps = change.profile == Profile::jump;
   const std::size_t at = jumps ? change.at : used.size() / 2;
   const ImageSize size{report.camera.width_px, report.camera.height_px};
   const std::span<const BoardView> all = used;
@@ -334,7 +334,7 @@ void count_change(const LensChange& change, CalibrateReport& report) {
 
 void heed_change(const LensChangeStudy& study, std::span<const std::string> photos, Verdict& verdict) {
   const Check check = check_of(study, photos);
-  const bool drifts = study.change && study.change->course == Course::drift;
+  const bool drifts = study.change && study.change->profile == Profile::drift;
   const std::string remedy =
       drifts ? "fix focus and zoom, let the camera warm up, and take the photos in the state in which it is used"
              : "fix lens, focus and zoom, and calibrate the photos before and after it apart";

@@ -13,8 +13,8 @@ namespace alidade {
 
 /// How the lens changes over the photos, in their order: a lens that warms up, an autofocus that creeps, a bump.
 struct LensChange {
-  enum class Course { drift, jump };
-  Course course = Course::drift;
+  enum class Profile { drift, jump };
+  Profile profile = Profile::drift;
   std::string what;           ///< "focal length", "cx" or "cy".
   double size = 0.0;          ///< From the first photo to the last; of the focal length relative, else [px].
   double sigma = 0.0;         ///< Of it, by the scatter of the photos.

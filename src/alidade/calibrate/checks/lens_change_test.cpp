@@ -27,19 +27,19 @@ constexpr int photos_of_a_set = 30;
 struct Departure {
   double focal = 0.0, cx_px = 0.0;
 };
-using Course = std::function<Departure(double place)>;
+using Profile = std::function<Departure(double place)>;
 
-Course drift(double focal) {
+Profile drift(double focal) {
   return [=](double place) { return Departure{focal * (place - 0.5)}; };
 }
-Course jump(Departure by) {
+Profile jump(Departure by) {
   return [=](double place) { return place < 0.5 ? Departure{} : by; };
 }
 
-Camera camera_at(const Course& course, double place) {
+Camera camera_at(const Profile& profile, double place) {
   const Camera camera = sample_camera("brown");
   Eigen::VectorXd lens = params(camera.lens);
-  const Departure by = course(place);
+  const Departure by = profile(place);
   lens.head<2>() *= 1.0 + by.focal;
   lens[2] += by.cx_px;
   Camera changed = camera;
@@ -47,12 +47,12 @@ Camera camera_at(const Course& course, double place) {
   return changed;
 }
 
-std::vector<BoardView> changing_views(const Course& course, std::uint64_t seed) {
+std::vector<BoardView> changing_views(const Profile& profile, std::uint64_t seed) {
   BoardScene scene = testing::covered_scene(sample_camera("brown"), photos_of_a_set, seed);
   std::shuffle(scene.cam_from_board.begin(), scene.cam_from_board.end(), std::mt19937_64(seed));
   std::vector<BoardView> views = testing::sample_views(scene, seed);
   for (std::size_t k = 0; k < views.size(); ++k) {
-    scene.camera = camera_at(course, static_cast<double>(k) / (photos_of_a_set - 1));
+    scene.camera = camera_at(profile, static_cast<double>(k) / (photos_of_a_set - 1));
     views[k] = testing::sample_views(scene, seed)[k];
   }
   return views;

@@ -1,5 +1,7 @@
 #include "alidade/calibrate/calibration.h"
 
+#include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "alidade/calibrate/checks/assumed.h"
@@ -7,6 +9,9 @@
 #include "alidade/calibrate/checks/calibration_verdict.h"
 #include "alidade/calibrate/checks/judge.h"
 #include "alidade/calibrate/checks/lens_change.h"
+#include "alidade/calibrate/checks/view_scores.h"
+#include "alidade/calibrate/study.h"
+#include "alidade/description/natural_order.h"
 
 namespace alidade {
 namespace {
@@ -36,17 +41,35 @@ Counts count_photos(const Calibration& result) {
   return counts;
 }
 
-std::vector<std::string> used_photos(const Calibration& result) {
-  std::vector<std::string> names;
-  for (std::size_t k = 0; k < result.board_views.size(); ++k)
-    if (result.views[k].used) names.push_back(result.board_views[k].photo);
-  return names;
+/// The views in use, in the order in which the photos were taken: a shell gives img10 before img2.
+struct OrderTaken {
+  std::vector<std::size_t> of_used;  ///< Position among the views in use.
+  std::vector<BoardView> views;
+  std::vector<std::string> photos;
+};
+
+OrderTaken order_taken(const Calibration& result) {
+  const std::vector<BoardView> used = used_views(result.board_views, result, result.board_views.size());
+  OrderTaken taken;
+  taken.of_used.resize(used.size());
+  std::iota(taken.of_used.begin(), taken.of_used.end(), std::size_t{0});
+  if (std::ranges::is_sorted(used, {}, &BoardView::photo)) {
+    std::ranges::stable_sort(taken.of_used, natural_less, [&](std::size_t k) { return used[k].photo; });
+  }
+  for (const std::size_t k : taken.of_used) {
+    taken.views.push_back(used[k]);
+    taken.photos.push_back(used[k].photo);
+  }
+  return taken;
 }
 
 /// A change of the lens over the photos that calibrations of its parts confirm.
-LensChangeStudy find_change(const Calibration& result) {
-  LensChangeStudy study = lens_change(view_scores(result.board, result.config, result.board_views, result), result);
-  if (study.change && !is_confirmed(*study.change, result.board, result.board_views, result.config, result))
+LensChangeStudy find_change(std::span<const ViewScore> scores, const OrderTaken& taken, const Calibration& result) {
+  std::vector<ViewScore> in_order;
+  for (std::size_t k = 0; !scores.empty() && k < taken.of_used.size(); ++k)
+    in_order.push_back(scores[taken.of_used[k]]);
+  LensChangeStudy study = lens_change(in_order, result);
+  if (study.change && !is_confirmed(*study.change, result.board, taken.views, result.config, result))
     study.change.reset();
   return study;
 }
@@ -89,15 +112,17 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   }
   const std::vector<ShapeTransfer> transfers = settle_shape(result, progress);
   result.counts = count_photos(result);
-  result.assumed = count_assumptions(board, result.config, result.board_views, air, result);
-  const LensChangeStudy change = find_change(result);
+  const std::vector<ViewScore> scores = view_scores(board, result.config, result.board_views, result);
+  result.assumed = count_assumptions(board, result.config, result.board_views, scores, air, result);
+  const OrderTaken taken = order_taken(result);
+  const LensChangeStudy change = find_change(scores, taken, result);
   if (change.change) count_change(*change.change, result);
   result.study = study_calibration(board, result.board_views, result.config, result,
                                    max_informative(transfers, result.config.board_shape), progress);
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
-  heed_change(change, used_photos(result), result.verdict);
+  heed_change(change, taken.photos, result.verdict);
   heed_assumptions(result.assumed, result.verdict);
   return result;
 }

@@ -1,11 +1,11 @@
 #include "alidade/images/photos.h"
 
 #include <algorithm>
-#include <cctype>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "alidade/description/natural_order.h"
 #include "alidade/images/exif.h"
 #include "alidade/images/foreign_images.h"
 #include "alidade/imaging/image_codecs.h"
@@ -17,30 +17,6 @@ bool looks_like_a_photo(const std::filesystem::path& file) {
   static const std::vector<std::string> endings = {".jpg", ".jpeg", ".png", ".tif", ".tiff",
                                                    ".bmp", ".pgm",  ".ppm", ".webp"};
   return std::find(endings.begin(), endings.end(), lower_ending(file)) != endings.end();
-}
-
-/// a2 before a10: runs of digits compare as numbers.
-bool natural_less(const std::string& a, const std::string& b) {
-  std::size_t i = 0, j = 0;
-  const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
-  while (i < a.size() && j < b.size()) {
-    if (digit(a[i]) && digit(b[j])) {
-      std::size_t i_end = i, j_end = j;
-      while (i_end < a.size() && digit(a[i_end])) ++i_end;
-      while (j_end < b.size() && digit(b[j_end])) ++j_end;
-      while (i + 1 < i_end && a[i] == '0') ++i;
-      while (j + 1 < j_end && b[j] == '0') ++j;
-      const std::string_view x(a.data() + i, i_end - i), y(b.data() + j, j_end - j);
-      if (x != y) return x.size() != y.size() ? x.size() < y.size() : x < y;
-      i = i_end;
-      j = j_end;
-    } else {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i;
-      ++j;
-    }
-  }
-  return a.size() - i < b.size() - j;
 }
 
 bool starts_with(std::string_view bytes, std::string_view magic) { return bytes.substr(0, magic.size()) == magic; }

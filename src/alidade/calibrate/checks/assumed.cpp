@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/calibrate/study.h"
 
 namespace alidade {
@@ -25,11 +24,9 @@ double ordinary_error(const std::string& name, double value) {
 }
 
 /// dθ/da of the free with respect to the fixed parameters; empty where the linearisation fails.
-Eigen::MatrixXd sensitivity(const Board& board, const CalibrateConfig& config, std::span<const BoardView> views,
-                            const CalibrateReport& report, const LensSplit& split) {
-  const std::vector<ViewScore> scores = view_scores(board, config, views, report);
+Eigen::MatrixXd sensitivity(std::span<const ViewScore> scores, const LensSplit& split) {
   if (scores.empty()) return {};
-  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(report.model_cov.rows(), report.model_cov.rows());
+  Eigen::MatrixXd S = 0.0 * scores.front().information;
   for (const ViewScore& view : scores) S += view.information;
   const Eigen::MatrixXd of_free = S(split.free, split.free);
   const Eigen::VectorXd scale = of_free.diagonal().cwiseSqrt().cwiseInverse();
@@ -83,10 +80,10 @@ void count_air(const Camera& air, const Eigen::MatrixXd& K, const LensSplit& spl
 }  // namespace
 
 std::vector<Assumption> count_assumptions(const Board& board, const CalibrateConfig& config,
-                                          std::span<const BoardView> views, const std::optional<Camera>& air,
-                                          CalibrateReport& report) {
+                                          std::span<const BoardView> views, std::span<const ViewScore> scores,
+                                          const std::optional<Camera>& air, CalibrateReport& report) {
   const LensSplit split = split_of(report);
-  const Eigen::MatrixXd K = split.fixed.empty() ? Eigen::MatrixXd() : sensitivity(board, config, views, report, split);
+  const Eigen::MatrixXd K = split.fixed.empty() ? Eigen::MatrixXd() : sensitivity(scores, split);
   const bool air_has_cov = air && air->cov.size() > 0 && K.size() > 0;
   if (air_has_cov) count_air(*air, K, split, report);
   std::vector<Assumption> assumed = {square_of(board, config, views, report, split)};

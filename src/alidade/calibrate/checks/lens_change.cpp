@@ -19,12 +19,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t min_views = 6;
-constexpr double care_sigmas = 2.0;
-/// Of a drift of the focal length that is included in σ, though it may be chance (one clean set in 80): where it is
-/// proved the first photo is off by 5σ already.
-constexpr double half_proved_sigmas = 2.5;
 constexpr std::string_view focal_length = "focal length";
 using Profile = LensChange::Profile;
+constexpr double care_sigmas = 2.0;
+/// Of a change of the focal length that is included in σ, though it may be chance (one clean set in 20 drifts, and one
+/// in 20 jumps somewhere): where it is proved the first photo is off by 5σ already.
+double included_from(Profile profile) { return profile == Profile::drift ? 2.0 : 3.5; }
 
 /// What could change, as a direction in the lens parameters, and what each view says of it: its score γ, its
 /// information α and what of that the estimated parameters share, b, in units in which their information is 1.
@@ -159,7 +159,7 @@ Found best_profile(const Direction& direction, Profile profile, const std::vecto
   return best;
 }
 
-/// Whether hardly any other order of the views shows as much. It stops as soon as too many do.
+/// Whether hardly any other order of the views, one in fifty, shows as much. It stops as soon as too many do.
 bool is_of_the_order(const Found& found, std::vector<Index> order) {
   constexpr int orders = 499, at_most = 9;
   constexpr double alike = 1.0 - 1e-9;  // the reverse order shows the same
@@ -198,11 +198,39 @@ double sigma_of(const VectorXd& t, const Found& found, const Estimated& all, dou
   return std::sqrt(sum * n / (n - 2.0)) / information;
 }
 
+/// Its information once the estimated parameters follow.
+double information_of(const VectorXd& t, const Direction& direction) {
+  return (t.array().square() * direction.information.array()).sum() - (direction.shared * t).squaredNorm();
+}
+
+/// From how many σ on it is no chance: by these one clean set in 350 drifts, and one in 500 jumps somewhere. The focal
+/// length is what drifts most, and matters most.
+double proved_from(const Found& found) {
+  if (found.profile == Profile::jump) return 4.0;
+  return found.direction->what == focal_length ? 3.1 : 3.5;
+}
+
+/// The size of a drift that is proved in 99 of 100 sets. In other orders of the photos a drift of z σ scatters by
+/// √(1 + h z²) σ: h is large where few photos determine it. None where no drift would stand out of the orders.
+std::optional<double> size_seen(const Found& drift, double sigma) {
+  const Direction& direction = *drift.direction;
+  const VectorXd t = values_of(drift, direction.score.size());
+  const VectorXd score = direction.information.cwiseProduct(t) - direction.shared.transpose() * (direction.shared * t);
+  const auto centred_square = [](const VectorXd& v) { return (v.array() - v.mean()).square().sum(); };
+  const double information = information_of(t, direction);
+  const double h =
+      centred_square(t) * centred_square(score) / (static_cast<double>(t.size() - 1) * information * information);
+  constexpr double at_99 = 2.33, of_fifty = 2.33;     // of a normal deviate: one-sided 99 %, two-sided 98 %
+  const double left = 1.0 - of_fifty * of_fifty * h;  // of z − 2.33 ≥ 2.33 √(1 + h z²)
+  constexpr double least_left = 0.2;
+  if (left < least_left) return std::nullopt;
+  return sigma * std::max(proved_from(drift) + at_99, (at_99 + of_fifty) / left);
+}
+
 LensChange change_of(const Found& found, const Estimated& all, const CalibrateReport& report) {
   const Direction& direction = *found.direction;
   const VectorXd t = values_of(found, direction.score.size());
-  const double information =
-      (t.array().square() * direction.information.array()).sum() - (direction.shared * t).squaredNorm();
+  const double information = information_of(t, direction);
   LensChange change{.profile = found.profile, .what = direction.what, .at = found.at, .direction = direction.of_lens};
   change.size = -t.dot(direction.score) / information;
   change.sigma = std::max(report.noise_px / std::sqrt(information), sigma_of(t, found, all, change.size, information));
@@ -215,21 +243,14 @@ LensChange change_of(const Found& found, const Estimated& all, const CalibrateRe
   return change;
 }
 
-/// From how many σ on it is no chance: by these one clean set in 350 drifts, and one in 500 jumps somewhere. The focal
-/// length is what drifts most, and matters most.
-double proved_from(const Found& found) {
-  if (found.profile == Profile::jump) return 4.0;
-  return found.direction->what == focal_length ? 3.1 : 3.5;
-}
-
 std::string sized(const LensChange& change, double value) {
   return change.what == focal_length ? text_of(100.0 * value, 2) : text_of(value, 2);
 }
 
 Check check_of(const LensChangeStudy& study, std::span<const std::string> photos) {
   Check check{.name = "same lens", .limit = care_sigmas, .unit = "σ", .figure = "photos"};
-  if (!study.seen_from) {
-    check.text = "too few photos to see whether the lens changes over them";
+  if (!study.change && !study.seen_from) {
+    check.text = "too few photos determine the focal length to see whether it changes over them";
     return check;
   }
   if (!study.change) {
@@ -264,18 +285,16 @@ LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateRep
       const Found found = best_profile(direction, profile, order);
       if (!(found.chi2 > 0.0)) continue;
       LensChange change = change_of(found, *all, report);
-      const double most = 0.05 * (direction.what == focal_length ? 1.0 : report.camera.width_px);
+      const bool is_focal = direction.what == focal_length;
+      if (is_focal && profile == Profile::drift) study.seen_from = size_seen(found, change.sigma);
+      const double most = 0.05 * (is_focal ? 1.0 : report.camera.width_px);
       if (std::abs(change.size) > most) continue;  // no lens does: another camera, or what is not modelled
       const double sigmas = std::abs(change.size) / change.sigma;
       change.is_proved = sigmas > proved_from(found) && is_of_the_order(found, order);
-      const bool is_focal_drift = change.what == focal_length && profile == Profile::drift;
-      constexpr double at_99 = 2.33;
-      if (is_focal_drift) study.seen_from = (proved_from(found) + at_99) * change.sigma;
       constexpr double most_unproved = 0.01;  // what warming up or a creeping focus comes to
-      const bool is_half_proved =
-          is_focal_drift && sigmas > half_proved_sigmas && std::abs(change.size) < most_unproved;
-      // A proved one goes before one that is half proved.
-      const double weight = sigmas * (change.is_proved ? 100.0 : is_half_proved ? 1.0 : 0.0);
+      const bool is_included = is_focal && sigmas > included_from(profile) && std::abs(change.size) < most_unproved;
+      // A proved one goes before one that is only included.
+      const double weight = sigmas * (change.is_proved ? 100.0 : is_included ? 1.0 : 0.0);
       if (weight > largest) {
         largest = weight;
         study.change = std::move(change);
@@ -304,17 +323,15 @@ CalibrateConfig with_distortion_fixed(CalibrateConfig config, const CalibrateRep
 
 }  // namespace
 
-bool is_confirmed(const LensChange& change, const Board& board, std::span<const BoardView> views,
+bool is_confirmed(const LensChange& change, const Board& board, std::span<const BoardView> used,
                   const CalibrateConfig& config, const CalibrateReport& report) {
   if (!is_central(report.camera.lens)) return true;
   const CalibrateConfig simple = with_distortion_fixed(config, report);
-  const std::vector<BoardView> used = used_views(views, report, views.size());
   const bool jumps = change.profile == Profile::jump;
   const std::size_t at = jumps ? change.at : used.size() / 2;
   const ImageSize size{report.camera.width_px, report.camera.height_px};
-  const std::span<const BoardView> all = used;
-  const CalibrateReport before = calibrate(board, all.first(at), size, simple, report.board_points),
-                        after = calibrate(board, all.subspan(at), size, simple, report.board_points);
+  const CalibrateReport before = calibrate(board, used.first(at), size, simple, report.board_points),
+                        after = calibrate(board, used.subspan(at), size, simple, report.board_points);
   if (before.status != CalibrateReport::Status::converged || after.status != before.status) return false;
   Index param = 0;
   change.direction.cwiseAbs().maxCoeff(&param);

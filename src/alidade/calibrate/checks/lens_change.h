@@ -28,27 +28,29 @@ struct LensChange {
 /// What is known of a change.
 struct LensChangeStudy {
   /// Drift of the focal length over the photos, relative, that would be proved in 99 of 100 sets like this. None where
-  /// there are fewer than six photos.
+  /// too few photos determine it.
   std::optional<double> seen_from;
   std::optional<LensChange> change;
 };
 
 /// The largest change of focal length, cx or cy over the photos: a score test of a drift and of a jump, by the noise
 /// of the corners and by the scatter of the photos, whichever is larger, which not more than one in fifty orders of the
-/// same photos shows as well: what the lens model does not explain is in all orders alike. A drift of the focal length
-/// is stated from where it is half proved. docs/maths/honest-sigma.md.
+/// same photos shows as well: what the lens model does not explain is in all orders alike. A change of the focal length
+/// that is not proved is stated and included in σ from 2σ of a drift, 3.5σ of a jump. `views`: in the order taken.
+/// docs/maths/honest-sigma.md.
 [[nodiscard]] LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateReport& report);
 
 /// Whether the views before and after it, calibrated apart, differ by as much, within 3σ: where lens or board are not
-/// as they are modelled, scores are not proof.
-[[nodiscard]] bool is_confirmed(const LensChange& change, const Board& board, std::span<const BoardView> views,
+/// as they are modelled, scores are not proof. `used`: the views in use, in the order taken.
+[[nodiscard]] bool is_confirmed(const LensChange& change, const Board& board, std::span<const BoardView> used,
                                 const CalibrateConfig& config, const CalibrateReport& report);
 
 /// Includes in σ of what was estimated that the lens of a photo departs from the stated one.
 void count_change(const LensChange& change, CalibrateReport& report);
 
 /// Adds the check "same lens" to the verdict. Of care where a change is proved and photos depart from the stated lens
-/// by more than two of its σ. `photos`: the names of those in use.
+/// by more than two of its σ. `photos`: the names of those in use, in the
+/// order taken.
 void heed_change(const LensChangeStudy& study, std::span<const std::string> photos, Verdict& verdict);
 
 }  // namespace alidade

@@ -35,7 +35,7 @@ std::vector<int> channels_for(const cv::Mat& photo, SpotColour colour) {
 }
 
 /// A light of comparable strength elsewhere, in any channel: what its own light leaks into other channels lies at the
-/// same place.
+/// same place, and patches within its disc are parts of it that speckle or compression cut off.
 const SpotCandidate* rival_of(const Channel& best, const std::vector<Channel>& channels, const LaserSpotConfig& config,
                               Eigen::Vector2d& px) {
   const SpotCandidate& spot = best.candidates.front();
@@ -43,7 +43,9 @@ const SpotCandidate* rival_of(const Channel& best, const std::vector<Channel>& c
     for (const SpotCandidate& other : channel.candidates) {
       px = channel.px(other);
       const bool is_same = (px - best.px(spot)).norm() < 2.0 * std::max(spot.radius_px, other.radius_px) + 2.0;
-      if (&other != &spot && !(is_same && &channel != &best) && other.strength >= config.rival_share * spot.strength)
+      const bool is_part = (px - best.px(spot)).norm() < 3.0 * spot.radius_px + 1.0 && best.signal.is_interpolated;
+      if (&other != &spot && !is_part && !(is_same && &channel != &best) &&
+          other.strength >= config.rival_share * spot.strength)
         return &other;
     }
   }

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/spot/spot_noise.h"
+
 namespace alidade {
 namespace {
 
-constexpr double spot_smoothing_px = 1.0;                      // the width of a small spot
-constexpr double smoothed_noise = 0.2821 / spot_smoothing_px;  // 1/(2 √π s): noise of the smoothed over that of a pixel
-constexpr float low_snr = 4.0F;                                // how far down the slopes a patch reaches
-constexpr int border_px = 2;  // of the part: too few neighbours to distinguish light from a single pixel's noise
+constexpr float low_snr = 4.0F;  // how far down the slopes a patch reaches
+constexpr int border_px = 2;     // of the part: too few neighbours to distinguish light from a single pixel's noise
 
 /// Mean of the eight neighbours.
 float ring_mean(const Image& image, Eigen::Index v, Eigen::Index u) {
@@ -36,14 +36,10 @@ void remove_hot_pixels(SpotSignal& signal) {
 
 /// The signal smoothed, in sigmas of its noise.
 Image signal_to_noise(const SpotSignal& signal) {
-  Image smooth = signal.detected, edge = signal.edge;
-  for (Image* image : {&smooth, &edge}) {
-    cv::Mat mat(static_cast<int>(image->rows()), static_cast<int>(image->cols()), CV_32F, image->data());
-    cv::GaussianBlur(mat, mat, cv::Size(7, 7), spot_smoothing_px, spot_smoothing_px, cv::BORDER_REPLICATE);
-  }
-  const auto noise = static_cast<float>(smoothed_noise * signal.sigma);
+  const Image smooth = smoothed_image(signal.detected), edge = smoothed_image(signal.edge);
+  const auto noise = static_cast<float>(signal.smoothed_sigma);
   // Errors at an edge are alike along it: smoothing does not lower them.
-  return smooth / (noise * noise + (static_cast<float>(signal.edge_sigma_px) * edge).square()).sqrt();
+  return smooth / (noise * noise + (static_cast<float>(signal.smoothed_edge_sigma_px) * edge).square()).sqrt();
 }
 
 /// What white paper shows: the background's bright end in the region.
@@ -143,6 +139,8 @@ std::vector<SpotCandidate> spot_candidates(SpotSignal& signal, const LaserSpotCo
   snr.topRows(border_px) = snr.bottomRows(border_px) = 0.0F;
   snr.leftCols(border_px) = snr.rightCols(border_px) = 0.0F;
   const double paper = paper_level(signal);
+  // Colours that demosaicing and compression invent are not normally distributed.
+  const double min_snr = (signal.is_interpolated ? 1.5 : 1.0) * config.min_snr;
   ImageMask lit = ((snr > low_snr) || (signal.is_saturated > 0)).cast<unsigned char>();
   const cv::Mat mask(static_cast<int>(lit.rows()), static_cast<int>(lit.cols()), CV_8U, lit.data());
   cv::Mat labels, boxes, centroids;
@@ -155,7 +153,7 @@ std::vector<SpotCandidate> spot_candidates(SpotSignal& signal, const LaserSpotCo
         label};
     float peak = 0.0F;
     patch.for_each([&](int v, int u) { peak = std::max(peak, snr(v, u)); });
-    if (!(static_cast<double>(peak) > config.min_snr)) continue;
+    if (!(static_cast<double>(peak) > min_snr)) continue;
     fill_saturated(signal, patch);
     const Moments moments = moments_of(signal, patch);
     if (!(moments.sum > 0.0)) continue;

@@ -134,22 +134,44 @@ struct EdgeModel {
 /// The pixels of the fit and the prior of r.
 class EdgeFit {
  public:
-  EdgeFit(const SpotSignal& signal, const SpotPlace& start, Print print, double background_light)
+  EdgeFit(const SpotSignal& signal, const SpotPlace& start, Print print)
       : print_(std::move(print)), ink_return_(print_.ink / print_.paper) {
-    const double reach = 3.0 * start.radius_px + 2.0;
+    const double reach = 3.0 * start.radius_px + 2.0, noise = signal.sum_sigma;
     const Eigen::Index rows = signal.light.rows(), cols = signal.light.cols();
     for (Eigen::Index v = 0; v < rows; ++v) {
       if (std::abs(static_cast<double>(v) - start.px.y()) > reach) continue;
       for (Eigen::Index u = 0; u < cols; ++u) {
         const Eigen::Vector2d px(static_cast<double>(u), static_cast<double>(v));
         if ((px - start.px).norm() > reach) continue;
-        const double light = static_cast<double>(signal.light(v, u)) - background_light;
+        const double light = static_cast<double>(signal.light(v, u)) - start.offset_light;
         const double edge = signal.edge_sigma_px * static_cast<double>(signal.edge(v, u));
-        const double shape = 0.02 * light;  // a laser's spot is not quite a Gaussian
-        pixels_.push_back({px, light, 1.0 / std::sqrt(signal.sigma * signal.sigma + edge * edge + shape * shape),
-                           signal.is_saturated(v, u) != 0});
+        pixels_.push_back({px, light, noise * noise + edge * edge, 0.0, signal.is_saturated(v, u) != 0});
       }
     }
+    set_speckle(0.02);
+  }
+
+  /// Of light that varies by this contrast, and of a shape that is not quite a Gaussian.
+  void set_speckle(double contrast) {
+    for (Pixel& pixel : pixels_)
+      pixel.inverse_sigma = 1.0 / std::sqrt(pixel.variance + std::pow(contrast * pixel.light, 2));
+  }
+  /// The contrast that the residuals show; a few bright pixels are most of the light, and the fit takes up their share.
+  [[nodiscard]] double speckle_of(const Vector7& p) const {
+    const Eigen::VectorXd r = residuals(p);
+    double excess = 0.0, light2 = 0.0, light4 = 0.0;
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+      const Pixel& pixel = pixels_[i];
+      if (pixel.is_saturated) continue;
+      const double off = r[static_cast<Eigen::Index>(i)] / pixel.inverse_sigma, square = pixel.light * pixel.light;
+      excess += off * off - pixel.variance;
+      light2 += square;
+      light4 += square * square;
+    }
+    const double num = light4 > 0.0 ? light2 * light2 / light4 : 0.0;
+    const double num_free = std::max(0.0, num - 5.0);
+    return light2 > 0.0 && num_free > 0.0 ? speckle_contrast(num * excess / light2, num_free)
+                                          : speckle_contrast(0.0, 0.0);
   }
 
   [[nodiscard]] Vector7 start(const SpotPlace& spot) const {
@@ -170,12 +192,26 @@ class EdgeFit {
     r[r.size() - 1] = (p[6] - ink_return_) / (0.03 + 0.3 * ink_return_);  // inks differ between colours
     return r;
   }
+  /// What residuals that neighbours share count more than their squares: correlated by ρ from pixel to pixel,
+  /// (1 + ρ)/(1 − ρ) along each axis.
+  [[nodiscard]] double shared_gain(const Vector7& p) const {
+    const Eigen::VectorXd r = residuals(p);
+    double products = 0.0, squares = 0.0;
+    for (std::size_t i = 0; i + 1 < pixels_.size(); ++i) {
+      if ((pixels_[i + 1].px - pixels_[i].px - Eigen::Vector2d::UnitX()).norm() > 0.1) continue;
+      const auto k = static_cast<Eigen::Index>(i);
+      products += r[k] * r[k + 1];
+      squares += 0.5 * (r[k] * r[k] + r[k + 1] * r[k + 1]);
+    }
+    const double rho = squares > 0.0 ? std::clamp(products / squares, 0.0, 0.6) : 0.0;
+    return std::pow((1.0 + rho) / (1.0 - rho), 2);
+  }
   [[nodiscard]] Eigen::Index num_pixels() const { return static_cast<Eigen::Index>(pixels_.size()); }
 
  private:
   struct Pixel {
     Eigen::Vector2d px;
-    double light, inverse_sigma;
+    double light, variance, inverse_sigma;
     bool is_saturated;
   };
   std::vector<Pixel> pixels_;
@@ -234,14 +270,35 @@ SpotPlace with_wide_sigma(SpotPlace spot) {
   return spot;
 }
 
+/// What the model of light and print misses.
+Eigen::Matrix2d missed_by_model(const SpotSignal& signal, const SpotPlace& start, const Eigen::Vector2d& moved,
+                                double radius_px) {
+  // It grows with the correction; without a photo to compare with the print is less known. So does a clipped core: it
+  // is the most informative part.
+  const double share = signal.background_is_lit || signal.is_modelled ? 0.15 : start.is_saturated ? 0.1 : 0.05;
+  double radii = 0.0;  // squares of shares of the radius
+  // Of a clipped spot only the slopes are seen, where pixels, blur and beam are not quite Gaussian.
+  if (start.is_saturated) radii += 0.01;
+  // A mosaic blurs each colour by its own neighbours, and JPEG keeps colours at half the resolution: the light is
+  // blurred otherwise than the print, and into the other side.
+  if (signal.is_interpolated) radii += 0.0225;
+  if (signal.step > 0.0) radii += 0.04;
+  // A grey photo made of a colour one hides what its colours cut, and a model what the light does near an edge.
+  if (signal.is_modelled) radii += 0.0144;
+  return share * share * moved * moved.transpose() +
+         (1e-4 + radii * radius_px * radius_px) * Eigen::Matrix2d::Identity();
+}
+
 }  // namespace
 
 SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start) {
   Print print = print_around(signal, start);
   const bool is_lit_up = signal.background_is_lit && start.is_saturated;
   if (!print.has_contrast() || is_lit_up) return with_wide_sigma(start);
-  const EdgeFit fit(signal, start, std::move(print), start.offset_light);
-  const EdgeSolution solution = best_edges(fit, fit.start(start));
+  EdgeFit fit(signal, start, std::move(print));
+  EdgeSolution solution = best_edges(fit, fit.start(start));
+  fit.set_speckle(fit.speckle_of(solution.p));
+  solution = best_edges(fit, solution.p);
   const Eigen::Vector2d moved = solution.p.head<2>() - start.px;
   const double dof = static_cast<double>(fit.num_pixels()) - 6.0;
   const double radius_px = std::exp(0.25 * (solution.p[3] + solution.p[4]));
@@ -252,13 +309,8 @@ SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start) {
   spot.px = solution.p.head<2>();
   spot.radius_px = radius_px;
   const Matrix7 inverse = solution.normal.ldlt().solve(Matrix7::Identity());
-  spot.cov = std::max(1.0, solution.cost / dof) * inverse.topLeftCorner<2, 2>();
-  // What the print's model misses grows with the correction; without a photo to compare with the print is less known.
-  // So does a clipped core: it is the most informative part.
-  const double share = signal.background_is_lit || signal.is_modelled ? 0.15 : start.is_saturated ? 0.1 : 0.05;
-  spot.cov += share * share * moved * moved.transpose() + 1e-4 * Eigen::Matrix2d::Identity();
-  // A grey photo made of a colour one hides what its colours cut, and a model what the light does near an edge.
-  if (signal.is_modelled) spot.cov += 0.0144 * radius_px * radius_px * Eigen::Matrix2d::Identity();
+  spot.cov = std::max(1.0, fit.shared_gain(solution.p) * solution.cost / dof) * inverse.topLeftCorner<2, 2>();
+  spot.cov += missed_by_model(signal, start, moved, radius_px);
   if (!spot.cov.allFinite()) return with_wide_sigma(start);
   return spot;
 }

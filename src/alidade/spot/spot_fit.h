@@ -17,6 +17,10 @@ struct SpotPlace {
   std::string reason;
 };
 
+/// Contrast of laser light, σ over mean, from `num` squares whose sum over that of the light's is `excess`: a laser
+/// always speckles, by how much few pixels do not say.
+[[nodiscard]] double speckle_contrast(double excess, double num);
+
 /// Centroid of the light in a disc of three sigmas around itself, iterated until convergence. Where ink and paper share
 /// the disc, it starts fit_on_edge().
 [[nodiscard]] SpotPlace measure_spot(const SpotSignal& signal, const SpotCandidate& candidate);

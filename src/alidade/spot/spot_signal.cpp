@@ -7,6 +7,7 @@
 
 #include "alidade/estimation/median.h"
 #include "alidade/spot/printed_squares.h"
+#include "alidade/spot/spot_noise.h"
 
 namespace alidade {
 namespace {
@@ -49,11 +50,6 @@ Image gradient_length(const Image& image, Image* du = nullptr, Image* dv = nullp
   if (du) *du = std::move(x);
   if (dv) *dv = std::move(y);
   return length;
-}
-
-/// Stride along both axes that leaves some ten thousand pixels: enough for six weights and a median to 1 %.
-Eigen::Index stride_of(Eigen::Index num_pixels) {
-  return std::max<Eigen::Index>(1, std::lround(std::sqrt(static_cast<double>(num_pixels) / 1e4)));
 }
 
 /// Weights of the best sum of some images for another one, by least squares without outliers: of some thousands of
@@ -243,32 +239,6 @@ cv::Rect part_of(const cv::Mat& photo, const LaserSpotAids& aids) {
   return part;
 }
 
-/// Noise where the background is even, and what is left at its edges beyond that noise, as a displacement.
-void measure_noise(SpotSignal& signal) {
-  std::vector<float> even, at_edges;
-  double edge_sum = 0.0;
-  const float strong = std::max(8.0F, 0.4F * signal.edge.maxCoeff());
-  const Eigen::Index step = stride_of(signal.detected.size() / 3);
-  for (Eigen::Index v = 1; v + 1 < signal.detected.rows(); ++v) {
-    for (Eigen::Index u = 1 + v % step; u + 1 < signal.detected.cols(); u += step * step) {
-      if (signal.is_in_region(v, u) == 0 || signal.is_saturated(v, u) != 0) continue;
-      const float edge = signal.edge(v, u), size = std::abs(signal.detected(v, u));
-      if (edge < 0.3F * strong) even.push_back(size);
-      if (edge < strong) continue;
-      at_edges.push_back(size);
-      edge_sum += static_cast<double>(edge);
-    }
-  }
-  signal.sigma = std::max(0.4, normal_from_mad * median_of(even));  // rounding alone makes 0.29, of two photos 0.41
-  // A print has many edges; those of a few pixels may be the spot's own light in the other channels.
-  if (at_edges.size() < 20 || 50 * at_edges.size() < even.size()) return;
-  const double rest = normal_from_mad * median_of(at_edges),
-               mean_edge = edge_sum / static_cast<double>(at_edges.size());
-  constexpr double max_edge_sigma_px = 0.3;  // what is worse was not compared with its like
-  signal.edge_sigma_px =
-      std::min(max_edge_sigma_px, std::sqrt(std::max(0.0, rest * rest - signal.sigma * signal.sigma)) / mean_edge);
-}
-
 bool is_chessboard(const LaserSpotAids& aids) {
   return aids.seen_board && aids.seen_board->board.kind == BoardKind::chessboard;
 }
@@ -292,7 +262,7 @@ void estimate_from_channels(const std::vector<Image>& channels, std::size_t at, 
   const double noise = noise_of(first), prior = prior_noises * noise * noise;
   const RobustSum sum(main, {&first, &second, &one}, unsaturated(main.max(first).max(second)), prior);
   if (sum.is_solved()) signal.background = sum.sum();
-  signal.background_is_lit = true;
+  signal.background_is_lit = signal.is_excess = true;
 }
 
 /// Background of a chessboard of known pose: its ink and paper.

@@ -201,6 +201,11 @@ std::vector<Eigen::Vector3d> stickers_in_cam(const SpotScene& scene, std::size_t
 
 }  // namespace
 
+cv::Mat as_camera_saves(const cv::Mat& photo, bool is_bayer, int jpeg_quality) {
+  const cv::Mat seen = is_bayer ? through_bayer(photo) : photo;
+  return jpeg_quality > 0 ? through_jpeg(seen, jpeg_quality) : seen;
+}
+
 cv::Mat render_spot_photo(const SpotScene& scene, std::size_t i, const SpotPhotoConfig& config, std::uint64_t seed) {
   SpotStudio studio(scene.boards, i, config.render, seed);
   const std::uint64_t own_seed = seed + 0x9e3779b97f4a7c15u * (2 * i + (config.is_on ? 1 : 2));
@@ -212,9 +217,7 @@ cv::Mat render_spot_photo(const SpotScene& scene, std::size_t i, const SpotPhoto
   if (config.speckle > 0.0) studio.add_speckle(config.speckle, own_seed + 1);
   for (const Eigen::Vector3d& place : stickers_in_cam(scene, i, config.num_stickers))
     studio.add_spot(place, scene.beam_direction_in_cam, 1.0, config.laser);
-  cv::Mat photo = studio.photo(config.exposure, own_seed);
-  if (config.is_bayer) photo = through_bayer(photo);
-  return config.jpeg_quality > 0 ? through_jpeg(photo, config.jpeg_quality) : photo;
+  return as_camera_saves(studio.photo(config.exposure, own_seed), config.is_bayer, config.jpeg_quality);
 }
 
 }  // namespace alidade

@@ -82,6 +82,10 @@ class SpotStudio {
   std::unique_ptr<Parts> parts_;
 };
 
+/// The photo through a sensor with one colour a pixel (RGGB, the others interpolated bilinearly), and JPEG of this
+/// quality (colours at half the resolution, 4:2:0; 0: not compressed).
+[[nodiscard]] cv::Mat as_camera_saves(const cv::Mat& photo, bool is_bayer, int jpeg_quality);
+
 /// Photo `i` of the scene in colour, 8-bit BGR: render_board_photo()'s grey print in white light and the laser's spot.
 /// The beam's light falls on the print, foreshortened by its tilt and returned by paper and ink as they return white
 /// light; it is blurred and integrated with them, and what exceeds 255 is cut off. The spot's true pixel is

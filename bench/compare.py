@@ -19,6 +19,7 @@ for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import cv2  # noqa: E402 (after the number of threads)
 
+import opencv_script  # noqa: E402
 import peers  # noqa: E402
 from bench_table import Row, as_markdown, seconds_text  # noqa: E402
 
@@ -144,20 +145,6 @@ def detect_row(label, paths, ours, goal_s):
     return Row(f"detection, {label}", texts, text, plain_s / own_s, f"≤ {1e3 * goal_s:.0f} ms", own_s <= goal_s)
 
 
-def opencv_script(paths):
-    """What a newcomer writes: photos to camera with OpenCV, no report."""
-    size, seen = None, []
-    for path in paths:
-        photo = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-        _, found, corners = peers.opencv_detect(photo)
-        size = photo.shape[::-1]
-        if found:
-            seen.append(corners)
-    grid = peers.np.zeros((54, 3), peers.np.float32)
-    grid[:, :2] = peers.np.mgrid[0:9, 0:6].T.reshape(-1, 2)
-    cv2.calibrateCamera([grid] * len(seen), seen, size, None, None)
-
-
 def wall(run):
     start = time.monotonic()
     run()
@@ -168,14 +155,17 @@ def report_row(label, paths, ours):
     say(f"13 photos to report ({label})")
     command = [ours.build / "alidade", "calibrate", *paths, "--board", "9x6", "--square", "0.025", "--quiet"]
     command += ["--out", ours.work / "report"]
-    own, theirs = [], []
+    script = [sys.executable, pathlib.Path(opencv_script.__file__), *paths]
+    own, theirs, inside = [], [], []
     for _ in range(5):
         own.append(wall(lambda: subprocess.run(command, capture_output=True, check=True)))
-        theirs.append(wall(lambda: opencv_script(paths)))
+        theirs.append(wall(lambda: subprocess.run(script, capture_output=True, check=True)))
+        inside.append(wall(lambda: opencv_script.calibrate(paths)))
     own_s, opencv_s = statistics.median(own), statistics.median(theirs)
     name = f"13 photos to report, {label}, wall"
-    texts = [f"OpenCV's script, no report, one thread {seconds_text(opencv_s)}"]
-    return Row(name, texts, seconds_text(own_s), opencv_s / own_s, "≤ 0.5 s", own_s <= 0.5)
+    work_s = seconds_text(statistics.median(inside))
+    texts = [f"OpenCV's script, no report {seconds_text(opencv_s)} (without starting Python, one thread {work_s})"]
+    return Row(name, texts, seconds_text(own_s), opencv_s / own_s, "≤ 0.5 s, ratio ≥ 1", own_s <= min(0.5, opencv_s))
 
 
 def main():

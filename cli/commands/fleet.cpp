@@ -59,17 +59,23 @@ struct WorkerArgs {
   std::string size, from;
 };
 
-/// The rows of a file through one worker, without a broker: lines "ID ROW", as simulate fleet leaves them.
-ExitCode work_offline(const WorkerArgs& args, Run& run) {
-  std::ifstream in(args.from);
-  if (!in) throw InputError(args.from + ": cannot be read");
+/// Lines "CAMERA ROW" of a file, as simulate fleet leaves them.
+std::vector<std::pair<std::string, std::string>> read_rows(const std::string& path) {
+  std::ifstream in(path);
+  if (!in) throw InputError(path + ": cannot be read");
   std::vector<std::pair<std::string, std::string>> rows;
   std::string line;
   for (std::size_t number = 1; std::getline(in, line); ++number) {
     const std::size_t space = line.find(' ');
-    if (space == std::string::npos) throw InputError(fmt::format("{}:{}: is not 'CAMERA ROW'", args.from, number));
+    if (space == std::string::npos) throw InputError(fmt::format("{}:{}: is not 'CAMERA ROW'", path, number));
     rows.emplace_back(line.substr(0, space), line.substr(space + 1));
   }
+  return rows;
+}
+
+/// The rows of a file through one worker, without a broker.
+ExitCode work_offline(const WorkerArgs& args, Run& run) {
+  const auto rows = read_rows(args.from);
   run.lap("read");
   std::map<std::string, FleetCamera> cameras;
   std::string alarms, fault;

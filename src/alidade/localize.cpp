@@ -24,6 +24,18 @@ void save_numbered(Localization& result) {
       result.saved_map.points.push_back({point.id, point.point_in_world, point.cov, {}});
 }
 
+/// Scale from sensors beside the camera.
+void add_scale(const LocalizeConfig& config, Localization& result) {
+  if (!result.is_scale_read) {
+    read_scales(config, result.map, result);
+    if (const auto read = scale_of(result); read && !result.has_target) {
+      apply_scale(*read, result);
+      result.is_scale_read = result.scale_known = true;
+    }
+  }
+  add_imu_scale(config, result);
+}
+
 }  // namespace
 
 /// The front ends point to config: it stays where it is.
@@ -102,14 +114,7 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
     run.of_images->sum_up(result);
   else if (run.of_observations)
     run.of_observations->sum_up(result);
-  if (!result.is_scale_read) {
-    read_scales(run.config, result.map, result);
-    if (const auto read = scale_of(result); read && !result.has_target) {
-      apply_scale(*read, result);
-      result.is_scale_read = result.scale_known = true;
-    }
-  }
-  add_imu_scale(run.config, result);
+  add_scale(run.config, result);
   result.saved_map.is_in_metres = result.scale_known;
   if (run.of_images)
     run.of_images->save_map(result);

@@ -106,32 +106,25 @@ double command_step(const PositionerLog& log) {
   return std::sqrt(sum2 / static_cast<double>(rests.size())) > min_share * step ? step : 0.0;
 }
 
-Verdict head_verdict(const HeadIdentification& identified) {
-  Verdict verdict;
-  if (!identified.lie.empty()) {
-    verdict.state = State::refused;
-    verdict.exit_code = ExitCode::undetermined;
-    verdict.sentence = identified.lie;
-    verdict.to_add = "look whether it moves; mend that first";
-    return verdict;
-  }
-  for (std::size_t i = 0; i < 2; ++i)
-    if (identified.axes[i].status != PositionerFit::Status::ok)
-      return refusal_of(head_axis_names[i], identified.axes[i]);
-  for (std::size_t i = 0; i < 2; ++i) {
-    const PositionerFit& fit = identified.axes[i];
-    const std::string axis = head_axis_names[i], missing = not_given(fit);
-    check_readings(fit, axis, verdict.checks);
-    check_grid(identified.logs[i], fit, axis, verdict.checks);
-    verdict.sentence += fmt::format("{}{} follows at up to {:.4g}°/s, {:.3g} ms late", i == 0 ? "" : "; ", axis,
-                                    fit.rate.value / degree, 1e3 * fit.latency.value);
-    if (!fit.reached_rate) verdict.sentence += ", and had no way to reach its largest rate";
-    const bool lacks = !fit.reached_rate || !std::isfinite(fit.dead_band.sigma);
-    verdict.checks.push_back(
-        {axis + " excitation", lacks ? State::care : State::good,
-         missing.empty() ? axis + ": all of the model was excited" : axis + ": the log does not show " + missing});
-    if (lacks) verdict.to_add = "give it more room: --" + axis + "-range LOW,HIGH";
-  }
+namespace {
+
+void judge_axis(const HeadIdentification& identified, std::size_t i, Verdict& verdict) {
+  const PositionerFit& fit = identified.axes[i];
+  const std::string axis = head_axis_names[i], missing = not_given(fit);
+  check_readings(fit, axis, verdict.checks);
+  check_grid(identified.logs[i], fit, axis, verdict.checks);
+  verdict.sentence += fmt::format("{}{} follows at up to {:.4g}°/s, {:.3g} ms late", i == 0 ? "" : "; ", axis,
+                                  fit.rate.value / degree, 1e3 * fit.latency.value);
+  if (!fit.reached_rate) verdict.sentence += ", and had no way to reach its largest rate";
+  const bool lacks = !fit.reached_rate || !std::isfinite(fit.dead_band.sigma);
+  verdict.checks.push_back(
+      {axis + " excitation", lacks ? State::care : State::good,
+       missing.empty() ? axis + ": all of the model was excited" : axis + ": the log does not show " + missing});
+  if (lacks) verdict.to_add = "give it more room: --" + axis + "-range LOW,HIGH";
+}
+
+/// The worst check's state. What is wrong comes first; of values that are not to be trusted nothing is said.
+void sum_up(Verdict& verdict) {
   std::string named;
   for (const Check& check : verdict.checks) {
     if (check.state == State::good) continue;
@@ -144,9 +137,29 @@ Verdict head_verdict(const HeadIdentification& identified) {
       verdict.state = State::care;
     }
   }
-  // What is wrong comes first; of values that are not to be trusted nothing is said.
-  if (verdict.state == State::bad) verdict.sentence = named;
-  if (verdict.state != State::bad && !named.empty()) verdict.sentence += "; " + named;
+  if (verdict.state == State::bad) {
+    verdict.sentence = named;
+  } else if (!named.empty()) {
+    verdict.sentence += "; " + named;
+  }
+}
+
+}  // namespace
+
+Verdict head_verdict(const HeadIdentification& identified) {
+  Verdict verdict;
+  if (!identified.lie.empty()) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::undetermined;
+    verdict.sentence = identified.lie;
+    verdict.to_add = "look whether it moves; mend that first";
+    return verdict;
+  }
+  for (std::size_t i = 0; i < 2; ++i)
+    if (identified.axes[i].status != PositionerFit::Status::ok)
+      return refusal_of(head_axis_names[i], identified.axes[i]);
+  for (std::size_t i = 0; i < 2; ++i) judge_axis(identified, i, verdict);
+  sum_up(verdict);
   judge_zoom(identified.zoom, verdict);
   return verdict;
 }

@@ -38,48 +38,50 @@ void SeenFrames::offer(double t_s, const cv::Mat& image, std::span<const Observa
   frames_.push_back({t_s, std::move(name), image.cols, image.rows, {tried.begin(), tried.end()}});
 }
 
+DataTable SeenFrames::observations_table() const {
+  std::vector<std::int64_t> frame, id;
+  std::vector<bool> used;
+  std::array<std::vector<double>, 7> c;
+  for (std::size_t at = 0; at < frames_.size(); ++at) {
+    for (const ObservationTried& observation : frames_[at].tried) {
+      frame.push_back(static_cast<std::int64_t>(at));
+      id.push_back(observation.id);
+      const double none = std::numeric_limits<double>::quiet_NaN();
+      const Eigen::Vector2d found_px = observation.found_px.value_or(Eigen::Vector2d(none, none));
+      const Eigen::Vector2d expected_px = observation.expected_px;
+      const Eigen::Matrix2d& S = observation.S;
+      const std::array<double, 7> row{expected_px.x(), expected_px.y(), S(0, 0),     S(0, 1),
+                                      S(1, 1),         found_px.x(),    found_px.y()};
+      for (std::size_t k = 0; k < 7; ++k) c[k].push_back(row[k]);
+      used.push_back(observation.is_used);
+    }
+  }
+  return {"sights",
+          {{"frame", frame},
+           {"id", id},
+           {"expected_u_px", rounded(c[0], 2)},
+           {"expected_v_px", rounded(c[1], 2)},
+           {"cov_uu_px2", c[2]},
+           {"cov_uv_px2", c[3]},
+           {"cov_vv_px2", c[4]},
+           {"u_px", rounded(c[5], 2)},
+           {"v_px", rounded(c[6], 2)},
+           {"used", used}}};
+}
+
 void SeenFrames::add_to(JobOutcome& outcome) const {
   if (frames_.empty()) return;
   std::vector<double> t_s;
   std::vector<std::string> names;
   std::vector<int> width_px, height_px;
-  std::vector<std::int64_t> frame, id;
-  std::vector<bool> used;
-  std::array<std::vector<double>, 7> c;
   for (const Frame& one : frames_) {
     t_s.push_back(one.t_s);
     names.push_back(one.name);
     width_px.push_back(one.width_px);
     height_px.push_back(one.height_px);
-    for (const ObservationTried& observation : one.tried) {
-      frame.push_back(static_cast<std::int64_t>(t_s.size()) - 1);
-      id.push_back(observation.id);
-      const double none = std::numeric_limits<double>::quiet_NaN();
-      const Eigen::Vector2d found_px = observation.found_px.value_or(Eigen::Vector2d(none, none));
-      const std::array<double, 7> row{observation.expected_px.x(),
-                                      observation.expected_px.y(),
-                                      observation.S(0, 0),
-                                      observation.S(0, 1),
-                                      observation.S(1, 1),
-                                      found_px.x(),
-                                      found_px.y()};
-      for (std::size_t k = 0; k < 7; ++k) c[k].push_back(row[k]);
-      used.push_back(observation.is_used);
-    }
   }
-  DataTable seen{"sights",
-                 {{"frame", frame},
-                  {"id", id},
-                  {"expected_u_px", rounded(c[0], 2)},
-                  {"expected_v_px", rounded(c[1], 2)},
-                  {"cov_uu_px2", c[2]},
-                  {"cov_uv_px2", c[3]},
-                  {"cov_vv_px2", c[4]},
-                  {"u_px", rounded(c[5], 2)},
-                  {"v_px", rounded(c[6], 2)},
-                  {"used", used}}};
   std::vector<DataTable>& data = outcome.document.data;
-  data.insert(data.begin(), std::move(seen));
+  data.insert(data.begin(), observations_table());
   data.insert(data.begin(),
               {"frames", {{"t_s", t_s}, {"name", names}, {"width_px", width_px}, {"height_px", height_px}}});
   for (const auto& [image, jpeg] : images_) outcome.images.push_back({image, jpeg});

@@ -27,6 +27,7 @@ class SeenFrames {
   [[nodiscard]] std::size_t num_images() const { return images_.size(); }
 
  private:
+  [[nodiscard]] DataTable observations_table() const;
   struct Frame {
     double t_s;
     std::string name;

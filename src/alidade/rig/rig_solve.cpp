@@ -173,12 +173,30 @@ int RigProblem::first_free(std::size_t head) const {
 
 int RigProblem::num_free() const { return first_free(free.size()); }
 
+namespace {
+
+/// Of a view's rows, and the two of its correction.
+RigViewResiduals zero_residuals(Eigen::Index rows, std::size_t num_free) {
+  return {Eigen::VectorXd::Zero(rows + 2), Eigen::MatrixXd::Zero(rows + 2, static_cast<Eigen::Index>(num_free)),
+          Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(rows + 2, 6),
+          Eigen::Matrix<double, Eigen::Dynamic, 2>::Zero(rows + 2, 2)};
+}
+
+/// Exact readings: a correction of its own weight, and of nothing else, stays zero.
+void add_correction(const RigProblem& problem, const Eigen::Vector2d& correction, RigViewResiduals& out) {
+  const bool is_exact = !(problem.sigma_encoder_rad > 0.0);
+  if (is_exact) out.J_correction.setZero();
+  out.r.tail<2>() = is_exact ? Eigen::Vector2d::Zero() : Eigen::Vector2d(correction / problem.sigma_encoder_rad);
+  out.J_correction.bottomRows<2>() = Eigen::Matrix2d::Identity() / (is_exact ? 1.0 : problem.sigma_encoder_rad);
+}
+
+}  // namespace
+
 std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const RigState& state, std::size_t view) {
   const RigView& which = problem.views[view];
   const HeadView& given = *which.view;
   const RigHead& rig_head = state.heads[which.head];
   const Rigid3& world_from_board = state.world_from_board[which.board];
-  const Eigen::Vector2d& correction = state.corrections_rad[view];
   const TurnedHead turned(rig_head.head, true_reading(problem, state, view));
   const Eigen::Matrix3d world_from_board_rotation = world_from_board.rotation.toRotationMatrix();
   const Eigen::Matrix3d cam_from_board_rotation = turned.cam_from_world_rotation * world_from_board_rotation;
@@ -190,11 +208,7 @@ std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const 
   }
   const auto seen = project_with_jacobians(rig_head.camera, points_in_cam);
   const std::vector<int>& free = problem.free[which.head];
-  const auto rows = static_cast<Eigen::Index>(2 * seen.size());
-  RigViewResiduals out{Eigen::VectorXd(rows + 2),
-                       Eigen::MatrixXd::Zero(rows + 2, static_cast<Eigen::Index>(free.size())),
-                       Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(rows + 2, 6),
-                       Eigen::Matrix<double, Eigen::Dynamic, 2>::Zero(rows + 2, 2)};
+  RigViewResiduals out = zero_residuals(static_cast<Eigen::Index>(2 * seen.size()), free.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!seen[i]) return std::nullopt;
     const Corner& corner = given.seen.corners[i];
@@ -210,11 +224,7 @@ std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const 
         -J_in_board * cross_matrix(problem.points_in_board[static_cast<std::size_t>(corner.index)]);
     out.J_correction.middleRows<2>(row) = by_readings;
   }
-  const bool is_exact = !(problem.sigma_encoder_rad > 0.0);
-  if (is_exact) out.J_correction.setZero();
-  // Exact readings: a correction of its own weight, and of nothing else, stays zero.
-  out.r.tail<2>() = is_exact ? Eigen::Vector2d::Zero() : Eigen::Vector2d(correction / problem.sigma_encoder_rad);
-  out.J_correction.bottomRows<2>() = Eigen::Matrix2d::Identity() / (is_exact ? 1.0 : problem.sigma_encoder_rad);
+  add_correction(problem, state.corrections_rad[view], out);
   if (!out.r.allFinite()) return std::nullopt;
   return out;
 }

@@ -97,25 +97,33 @@ void TurningAdjustment::pass(std::size_t stride, const Eigen::Vector4d& k) {
   }
 }
 
+namespace {
+
+/// Of point i of a group: its coupling with the intrinsics, and the inverse of its own information.
+template <typename Group>
+Eigen::Matrix<double, 2, 4> coupling_of(const Group& s, Eigen::Index i) {
+  return Eigen::Matrix<double, 2, 4>{{s.ax[i], s.ay[i], s.a1[i], s.a2[i]}, {s.bx[i], s.by[i], s.b1[i], s.b2[i]}};
+}
+
+template <typename Group>
+Eigen::Matrix2d inverse_of(const Group& s, Eigen::Index i) {
+  const double determinant = s.aa[i] * s.bb[i] - s.ab[i] * s.ab[i];
+  return Eigen::Matrix2d{{s.bb[i], -s.ab[i]}, {-s.ab[i], s.aa[i]}} / determinant;
+}
+
+}  // namespace
+
 /// A Gauss–Newton step of the sums of a pass. False: they do not determine the intrinsics.
 bool TurningAdjustment::step(std::size_t num_rows, Eigen::Vector4d& k) {
-  using Coupling = Eigen::Matrix<double, 2, 4>;
   Eigen::Matrix4d& S = information_;
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
   S.setZero();
   squares_ = gain_ = 0.0;
   const auto n = static_cast<double>(num_rows);
-  const auto coupling_of = [](const Group& s, Eigen::Index i) {
-    return Coupling{{s.ax[i], s.ay[i], s.a1[i], s.a2[i]}, {s.bx[i], s.by[i], s.b1[i], s.b2[i]}};
-  };
-  const auto inverse_of = [](const Group& s, Eigen::Index i) -> Eigen::Matrix2d {
-    const double determinant = s.aa[i] * s.bb[i] - s.ab[i] * s.ab[i];
-    return Eigen::Matrix2d{{s.bb[i], -s.ab[i]}, {-s.ab[i], s.aa[i]}} / determinant;
-  };
   for (std::size_t point = 0; point < num_points_; ++point) {
     const Group& s = groups_[point / 4];
     const auto i = static_cast<Eigen::Index>(point % 4);
-    const Coupling B = coupling_of(s, i);
+    const Eigen::Matrix<double, 2, 4> B = coupling_of(s, i);
     const Eigen::Matrix2d D_inverse = inverse_of(s, i);
     const Eigen::Vector2d g(s.ga[i], s.gb[i]);
     S(0, 0) += s.xx[i];

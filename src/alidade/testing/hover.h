@@ -108,13 +108,32 @@ inline std::optional<Eigen::Vector2d> seen(HoverLens lens, const Eigen::VectorXd
   return px;
 }
 
-}  // namespace hover
+/// Sines of position and of the rotation vector.
+struct Motion {
+  Eigen::Vector<double, 6> amplitude, frequency_hz, phase;
+  double distance_m = 0.0;
 
-inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
-  Draws draws(seed);
-  HoverRun run;
-  run.camera = hover::camera_of(scene.lens);
-  const Eigen::VectorXd p = params(run.camera.lens);
+  [[nodiscard]] Rigid3 at(double t_s) const {
+    Eigen::Vector<double, 6> at;
+    for (int i = 0; i < 6; ++i)
+      at[i] = amplitude[i] * std::sin(2.0 * std::numbers::pi * frequency_hz[i] * t_s + phase[i]);
+    return Rigid3{exp_so3(at.tail<3>()), at.head<3>() - Eigen::Vector3d(0.0, 0.0, distance_m)};
+  }
+};
+
+inline Motion motion_of(const Hover& scene, Draws& draws) {
+  Motion motion{.distance_m = scene.distance_m};
+  motion.amplitude << 0.17, 0.13, 0.14, 0.13, 0.13, 0.13;
+  for (int i = 0; i < 6; ++i) {
+    motion.frequency_hz[i] = draws.uniform(0.1, 0.3);
+    motion.phase[i] = draws.uniform(0.0, 2.0 * std::numbers::pi);
+  }
+  if (scene.turns_in_place) motion.amplitude.head<3>().setZero();
+  return motion;
+}
+
+/// The points of the target, which are also given, and others.
+inline std::vector<Eigen::Vector3d> points_of(const Hover& scene, Draws& draws, HoverRun& run) {
   std::vector<Eigen::Vector3d> points{{-0.15, -0.1, 0.0}, {0.15, -0.1, 0.0}, {0.15, 0.1, 0.0},
                                       {-0.15, 0.1, 0.0},  {0.05, 0.0, 0.0},  {-0.05, 0.05, 0.0}};
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -127,41 +146,45 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
     const double x = wide * draws.uniform(-0.8, 0.8), y = wide * draws.uniform(-0.6, 0.6), z = draws.uniform(-0.2, 0.9);
     points.emplace_back(x, y, z);
   }
-  Eigen::Vector<double, 6> amplitude, frequency_hz, phase;
-  amplitude << 0.17, 0.13, 0.14, 0.13, 0.13, 0.13;
-  for (int i = 0; i < 6; ++i) {
-    frequency_hz[i] = draws.uniform(0.1, 0.3);
-    phase[i] = draws.uniform(0.0, 2.0 * std::numbers::pi);
-  }
-  if (scene.turns_in_place) amplitude.head<3>().setZero();
-  const auto pose_at = [&](double t_s) {
-    Eigen::Vector<double, 6> at;
-    for (int i = 0; i < 6; ++i)
-      at[i] = amplitude[i] * std::sin(2.0 * std::numbers::pi * frequency_hz[i] * t_s + phase[i]);
-    return Rigid3{exp_so3(at.tail<3>()), at.head<3>() - Eigen::Vector3d(0.0, 0.0, scene.distance_m)};
-  };
-  std::vector<Eigen::Vector2d> errors_px(points.size());
+  return points;
+}
+
+/// Where a point is seen, its row exposed when it is.
+inline std::optional<Eigen::Vector2d> seen_at(const Hover& scene, const Eigen::VectorXd& lens, const Motion& motion,
+                                              const Eigen::Vector3d& point, double t_s) {
+  auto px = seen(scene.lens, lens, motion.at(t_s).inverse() * point);
+  for (int again = 0; again < 4 && px && scene.readout_s > 0.0; ++again)
+    px = seen(scene.lens, lens, motion.at(t_s + scene.readout_s * (px->y() / 576.0 - 0.5)).inverse() * point);
+  return px;
+}
+
+}  // namespace hover
+
+inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
+  Draws draws(seed);
+  HoverRun run;
+  run.camera = hover::camera_of(scene.lens);
+  const Eigen::VectorXd lens = params(run.camera.lens);
+  run.points = hover::points_of(scene, draws, run);
+  const hover::Motion motion = hover::motion_of(scene, draws);
+  std::vector<Eigen::Vector2d> errors_px(run.points.size());
   for (int k = 0; k < scene.num_frames; ++k) {
     const double t_s = k * scene.dt_s;
-    const Rigid3 world_from_cam = pose_at(t_s);
     ObservationFrame frame{k, t_s, {}};
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t i = 0; i < run.points.size(); ++i) {
       Eigen::Vector2d noise = scene.sigma_px * draws.normal2();
       if (k > 0) noise = scene.lasting * errors_px[i] + std::sqrt(1.0 - scene.lasting * scene.lasting) * noise;
       errors_px[i] = noise;
       if (scene.mismatches > 0.0 && draws.uniform() < scene.mismatches && k > 0)
         noise = scene.max_mismatched_px * Eigen::Vector2d(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
-      Eigen::Vector3d point = points[i];
+      Eigen::Vector3d point = run.points[i];
       if (i < run.target.size()) point.x() += scene.target_speed_m_s * t_s;
-      auto px = hover::seen(scene.lens, p, world_from_cam.inverse() * point);
-      for (int again = 0; again < 4 && px && scene.readout_s > 0.0; ++again)
-        px = hover::seen(scene.lens, p, pose_at(t_s + scene.readout_s * (px->y() / 576.0 - 0.5)).inverse() * point);
+      const auto px = hover::seen_at(scene, lens, motion, point, t_s);
       if (px) frame.observations.push_back({static_cast<long>(i) + 1, *px + noise, 0.0});
     }
     run.frames.push_back(std::move(frame));
-    run.truth.push_back({t_s, world_from_cam});
+    run.truth.push_back({t_s, motion.at(t_s)});
   }
-  run.points = points;
   return run;
 }
 

@@ -260,6 +260,79 @@ double reading_step(const std::vector<PositionerReading>& readings) {
   return whole > 0.0 && whole < 1e5 ? (angles.back() - angles.front()) / whole : step;
 }
 
+namespace {
+
+/// The optimum with its σ, and what counts as evidence there.
+struct Optimum {
+  PositionerVector theta, sigma;
+  std::vector<int> free;
+  double noise2 = 1.0;
+  double least_evidence = 0.0;
+};
+
+Optimum solve(const PositionerLog& log, PositionerProblem& problem, PositionerFit& fit) {
+  Optimum found{.theta = best_start(problem, fit.fastest_rad_s, first_latency(log))};
+  double cost = problem.solve(found.theta, own_places);
+  find_sampling(problem, found.theta, cost, fit);
+  found.free = fit.encoder_hz > 0.0 ? sampled_places : own_places;
+  const double mean = cost / static_cast<double>(problem.size() - found.free.size());
+  fit.noise = std::sqrt(mean);
+  found.noise2 = std::max(1.0, mean);
+  found.sigma = sigmas_of(problem, found.theta, found.free, found.noise2);
+  found.least_evidence = std::log(static_cast<double>(problem.size())) + 6.0;  // BIC, and what is not modelled
+  return found;
+}
+
+void fill_rate(const PositionerParams& params, const PositionerVector& sigma, PositionerFit& fit) {
+  fit.reached_rate = params.rate_rad_s < 1.1 * fit.fastest_rad_s;
+  fit.rate = {params.rate_rad_s, sigma[P::rate] * params.rate_rad_s, fit.reached_rate, 0.0};
+  if (fit.reached_rate) return;
+  fit.rate.value = std::max(fit.fastest_rad_s, std::min(params.rate_rad_s, 2.0 * fit.fastest_rad_s));
+  fit.rate.sigma = std::max(fit.rate.sigma, 0.3 * fit.rate.value);
+}
+
+/// Values that a log need not show: acceleration, time constant, backlash.
+void fill_tested(PositionerProblem& problem, const Optimum& found, double step, PositionerFit& fit) {
+  const PositionerParams params = positioner_params(found.theta, fit.dead_band.value);
+  const auto value = [&](int place, double nothing, double at, double sigma) {
+    const double evidence = evidence_of(problem, found.theta, found.free, place, nothing, found.noise2);
+    return decltype(fit.backlash){at, sigma, evidence > found.least_evidence, evidence};
+  };
+  fit.acceleration = value(P::acceleration, std::log(boundless_acceleration_rad_s2), params.acceleration_rad_s2,
+                           found.sigma[P::acceleration] * params.acceleration_rad_s2);
+  fit.time_constant = value(P::time_constant, std::log(instant_s), params.time_constant_s,
+                            found.sigma[P::time_constant] * params.time_constant_s);
+  // Neighbouring readings round alike: what they say together is not below a quarter of a step.
+  fit.backlash = value(P::backlash, 0.0, params.backlash_rad, std::hypot(found.sigma[P::backlash], 0.25 * step));
+}
+
+void fill_latency(const PositionerLog& log, const PositionerProblem& problem, const Optimum& found,
+                  PositionerFit& fit) {
+  constexpr double phase_share = 0.02;  // when in its period the encoder is sampled is known no better
+  const double period = fit.encoder_hz > 0.0 ? 1.0 / fit.encoder_hz : 0.0;
+  // Who sent and who received do not agree better on when than the answer took.
+  std::vector<double> waits;
+  for (const PositionerReading& reading : problem.readings()) waits.push_back(reading.wait_s);
+  const double shared_s = std::hypot(median_wait(log.command_waits_s), median_wait(waits)) / std::sqrt(12.0);
+  const double latency_s = positioner_params(found.theta, fit.dead_band.value).latency_s;
+  fit.latency = {latency_s + 0.5 * period,
+                 std::hypot(std::hypot(found.sigma[P::latency], shared_s), std::hypot(2e-4, phase_share * period)),
+                 true, 0.0};
+}
+
+void fill_residuals(PositionerProblem& problem, const PositionerVector& theta, PositionerFit& fit) {
+  fit.model_rad = problem.model(theta);
+  double sum2 = 0.0;
+  for (std::size_t i = 0; i < problem.size(); ++i) {
+    fit.t_s.push_back(problem.readings()[i].t_s);
+    fit.residual_rad.push_back(fit.model_rad[i] - problem.readings()[i].angle_rad);
+    sum2 += fit.residual_rad.back() * fit.residual_rad.back();
+  }
+  fit.rms_rad = std::sqrt(sum2 / static_cast<double>(problem.size()));
+}
+
+}  // namespace
+
 PositionerFit fit_positioner(const PositionerLog& log) {
   PositionerFit fit;
   if (log.readings.size() < 30 || log.commands.size() < 3) return fit;
@@ -280,51 +353,13 @@ PositionerFit fit_positioner(const PositionerLog& log) {
     return fit;
   }
   fit.fastest_rad_s = fastest(problem.readings());
-  PositionerVector theta = best_start(problem, fit.fastest_rad_s, first_latency(log));
-  double cost = problem.solve(theta, own_places);
-  find_sampling(problem, theta, cost, fit);
-  const std::vector<int>& free = fit.encoder_hz > 0.0 ? sampled_places : own_places;
-  const double noise2 = std::max(1.0, cost / static_cast<double>(problem.size() - free.size()));
-  fit.noise = std::sqrt(cost / static_cast<double>(problem.size() - free.size()));
-  PositionerVector sigma = sigmas_of(problem, theta, free, noise2);
-  const double least = std::log(static_cast<double>(problem.size())) + 6.0;  // BIC, and some for what is not modelled
-  const PositionerParams params = positioner_params(theta, fit.dead_band.value);
-  const auto test = [&](int place, double nothing) {
-    return evidence_of(problem, theta, free, place, nothing, noise2);
-  };
-  fit.reached_rate = params.rate_rad_s < 1.1 * fit.fastest_rad_s;
-  fit.rate = {params.rate_rad_s, sigma[P::rate] * params.rate_rad_s, fit.reached_rate, 0.0};
-  if (!fit.reached_rate) {
-    fit.rate.value = std::max(fit.fastest_rad_s, std::min(params.rate_rad_s, 2.0 * fit.fastest_rad_s));
-    fit.rate.sigma = std::max(fit.rate.sigma, 0.3 * fit.rate.value);
-  }
-  const double e_acceleration = test(P::acceleration, std::log(boundless_acceleration_rad_s2));
-  fit.acceleration = {params.acceleration_rad_s2, sigma[P::acceleration] * params.acceleration_rad_s2,
-                      e_acceleration > least, e_acceleration};
-  const double e_tau = test(P::time_constant, std::log(instant_s));
-  fit.time_constant = {params.time_constant_s, sigma[P::time_constant] * params.time_constant_s, e_tau > least, e_tau};
-  const double e_backlash = test(P::backlash, 0.0);
-  // Neighbouring readings round alike: what they say together is not below a quarter of a step.
-  fit.backlash = {params.backlash_rad, std::hypot(sigma[P::backlash], 0.25 * step), e_backlash > least, e_backlash};
-  constexpr double phase_share = 0.02;  // when in its period the encoder is sampled is known no better
-  const double period = fit.encoder_hz > 0.0 ? 1.0 / fit.encoder_hz : 0.0;
-  // Who sent and who received do not agree better on when than the answer took.
-  std::vector<double> waits;
-  for (const PositionerReading& reading : problem.readings()) waits.push_back(reading.wait_s);
-  const double shared_s = std::hypot(median_wait(log.command_waits_s), median_wait(waits)) / std::sqrt(12.0);
-  fit.latency = {params.latency_s + 0.5 * period,
-                 std::hypot(std::hypot(sigma[P::latency], shared_s), std::hypot(2e-4, phase_share * period)), true,
-                 0.0};
-  fit.offset_rad = theta[P::offset];
-  fit.sigma_offset_rad = sigma[P::offset];
-  fit.model_rad = problem.model(theta);
-  double sum2 = 0.0;
-  for (std::size_t i = 0; i < problem.size(); ++i) {
-    fit.t_s.push_back(problem.readings()[i].t_s);
-    fit.residual_rad.push_back(fit.model_rad[i] - problem.readings()[i].angle_rad);
-    sum2 += fit.residual_rad.back() * fit.residual_rad.back();
-  }
-  fit.rms_rad = std::sqrt(sum2 / static_cast<double>(problem.size()));
+  const Optimum found = solve(log, problem, fit);
+  fill_rate(positioner_params(found.theta, fit.dead_band.value), found.sigma, fit);
+  fill_tested(problem, found, step, fit);
+  fill_latency(log, problem, found, fit);
+  fit.offset_rad = found.theta[P::offset];
+  fit.sigma_offset_rad = found.sigma[P::offset];
+  fill_residuals(problem, found.theta, fit);
   return fit;
 }
 

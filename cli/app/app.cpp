@@ -115,11 +115,23 @@ bool knows(const CLI::App& app, const std::string& option) {
 std::string early_option(const CLI::App& app, const CLI::App& at) {
   if (!subcommand_names(app).empty()) {
     for (const std::string& word : app.remaining()) {
-      if (is_option(word) && knows(at, name_of(word))) return name_of(word);
+      if (!is_option(word)) break;  // a command, though an unknown one
+      if (knows(at, name_of(word))) return name_of(word);
     }
   }
   const auto parsed = app.get_subcommands();
   return parsed.empty() ? "" : early_option(*parsed.front(), at);
+}
+
+/// "'--size' needs a value: WxH": an option that the line ends with, or that another follows.
+std::string missing_value(const CLI::App& at, const CLI::ParseError& error) {
+  const std::string what = error.what(), name = what.substr(0, what.find(':'));
+  const CLI::Option* option = at.get_option_no_throw(name);
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr || option == nullptr) return "";
+  const int count = option->get_items_expected_min();
+  const std::string type = option->get_type_name();
+  return "'" + name + "' needs " + (count == 1 ? "a value" : std::to_string(count) + " values") + ": " +
+         type.substr(0, std::min(type.find(" REQUIRED"), type.find(':')));
 }
 
 /// What is wrong with the line, in one line that says what to do.
@@ -130,14 +142,15 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
     return "'" + early + "' comes after the command: alidade " + command + (command.empty() ? "" : " ") +
            (subcommand_names(at).empty() ? "" : "COMMAND ") + early + " …";
   }
+  const std::vector<std::string> names = subcommand_names(at);
   std::string extra;
-  for (const std::string& word : app.remaining(true)) {  // an unknown option explains more than its effects
-    if (extra.empty() || (extra.front() != '-' && word.front() == '-')) extra = word;
+  for (const std::string& word : app.remaining(true)) {
+    // An unknown option explains more than its effects; an unknown command explains its options.
+    if (extra.empty() || (names.empty() && extra.front() != '-' && word.front() == '-')) extra = word;
   }
   if (is_option(extra)) {
     return where(at) + "unknown option '" + name_of(extra) + "'" + suggestion(name_of(extra), option_names(at));
   }
-  const std::vector<std::string> names = subcommand_names(at);
   if (!extra.empty() && !names.empty()) {
     return where(at) + "unknown command '" + extra + "'" + suggestion(extra, names);
   }
@@ -149,6 +162,7 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
   }
   const std::string in_help = "; see alidade " + where(at).substr(0, where(at).size() - 2) + " --help";
   if (!extra.empty()) return where(at) + "unexpected argument '" + extra + "'";
+  if (const std::string missing = missing_value(at, error); !missing.empty()) return where(at) + missing;
   const bool is_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
   return where(at) + error.what() + (is_missing ? in_help : "");
 }

@@ -106,6 +106,16 @@ TEST(Executable, UnknownCommandsAndNoCommandAreWrongUsage) {
   EXPECT_EQ(run_alidade({}).code, 2);
   EXPECT_EQ(run_alidade({"levitate"}).err, "alidade: error: unknown command 'levitate'\n");
   EXPECT_THAT(run_alidade({"calibrat"}).err, HasSubstr("did you mean 'calibrate'?"));
+  EXPECT_THAT(run_alidade({"calibrat", "photos", "--board", "9x6", "--out", "x", "--none"}).err,
+              HasSubstr("unknown command 'calibrat'; did you mean 'calibrate'?"));
+  EXPECT_THAT(run_alidade({"camera", "shw", "a.yaml", "--json"}).err, HasSubstr("unknown command 'shw'"));
+}
+
+TEST(Executable, AnOptionWithoutItsValueSaysWhatItTakes) {
+  EXPECT_EQ(run_alidade({"observe", "log.csv", "--size"}).err,
+            "alidade: error: observe: '--size' needs a value: WxH\n");
+  EXPECT_EQ(run_alidade({"simulate", "board", "--seed"}).err,
+            "alidade: error: simulate board: '--seed' needs a value: N\n");
 }
 
 TEST(Executable, AnOptionBeforeItsCommandIsNamedWithItsPosition) {

@@ -111,6 +111,13 @@ TEST(Executable, UnknownCommandsAndNoCommandAreWrongUsage) {
   EXPECT_THAT(run_alidade({"camera", "shw", "a.yaml", "--json"}).err, HasSubstr("unknown command 'shw'"));
 }
 
+TEST(Executable, HelpIsACommandToo) {
+  EXPECT_EQ(run_alidade({"help"}).out, run_alidade({"--help"}).out);
+  const Outcome outcome = run_alidade({"help", "camera", "show"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_EQ(outcome.out, run_alidade({"camera", "show", "--help"}).out);
+}
+
 TEST(Executable, AnOptionWithoutItsValueSaysWhatItTakes) {
   EXPECT_EQ(run_alidade({"observe", "log.csv", "--size"}).err,
             "alidade: error: observe: '--size' needs a value: WxH\n");

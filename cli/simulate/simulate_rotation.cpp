@@ -117,15 +117,34 @@ FarWorld world_of(const SimulateRotationArgs& args, Run& run) {
   return FarWorld::of_photo(photo, args.photo_deg * std::numbers::pi / 180.0 / photo.cols);
 }
 
+RotationFaults faults_of(const SimulateRotationArgs& args) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  RotationFaults faults = args.faults;
+  faults.backlash_rad = args.backlash_deg * degree;
+  if (!args.curve_deg.empty()) {
+    faults.once_a_turn_rad = args.curve_deg[0] * degree;
+    faults.twice_a_turn_rad = args.curve_deg[1] * degree;
+  }
+  if (!args.zero_drift.empty()) faults.zero_drift_rad_per_s = Eigen::Vector2d(args.zero_drift.data());
+  if (!args.signs.empty()) faults.signs = Eigen::Vector2d(args.signs.data());
+  return faults;
+}
+
 /// Frames as a camera on a head sees them, and the angles it reads: what `observe --video` takes.
 ExitCode simulate_video(const SimulateRotationArgs& args, const RotationScene& scene, const RotationLogConfig& config,
                         Run& run) {
   FarWorld world = world_of(args, run);
-  const RotationLog log = panorama_log(scene, config, run.options.seed);
+  RotationLog log = panorama_log(scene, config, run.options.seed);
+  const RotationFaults faults = faults_of(args);
+  if (faults.are_of_rotation() && log.source != RotationSource::head)
+    throw UsageError("errors of the angles are of a head's: --source head");
+  add_faults(faults, scene.width_px, scene.height_px, run.options.seed, log);
+  PanoramaConfig panorama = args.panorama;
+  panorama.moving_share = faults.moving_share;
   for (std::size_t k = 0; k < log.rows.size(); ++k) {
     report_progress(run.progress, "frames", k, log.rows.size());
     run.add_file(fmt::format("frames/{:06}.png", k),
-                 png_bytes(render_panorama_frame(world, scene, k, config.rate_hz, args.panorama, run.options.seed)));
+                 png_bytes(render_panorama_frame(world, scene, k, config.rate_hz, panorama, run.options.seed)));
   }
   run.add_file("angles.csv", rotation_log_csv(log));
   run.add_file("truth_camera.yaml", truth_yaml(args, Eigen::Vector4d(log.truth.back().data()), scene));
@@ -181,19 +200,6 @@ ExitCode simulate_photos(const SimulateRotationArgs& args, const RotationScene& 
   verdict.sentence = fmt::format("{} photos and matches between them, with known truth", attitudes.size());
   run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
   return run.finish(verdict);
-}
-
-RotationFaults faults_of(const SimulateRotationArgs& args) {
-  constexpr double degree = std::numbers::pi / 180.0;
-  RotationFaults faults = args.faults;
-  faults.backlash_rad = args.backlash_deg * degree;
-  if (!args.curve_deg.empty()) {
-    faults.once_a_turn_rad = args.curve_deg[0] * degree;
-    faults.twice_a_turn_rad = args.curve_deg[1] * degree;
-  }
-  if (!args.zero_drift.empty()) faults.zero_drift_rad_per_s = Eigen::Vector2d(args.zero_drift.data());
-  if (!args.signs.empty()) faults.signs = Eigen::Vector2d(args.signs.data());
-  return faults;
 }
 
 ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
@@ -262,7 +268,8 @@ void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
   number("--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
   number("--wrong", faults.wrong_share, "Share of pixels that are anywhere; of wrong matches in pairs.csv", 0.0, 0.95);
   number("--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);
-  number("--moving", faults.moving_share, "Share of points that move, also of those in pairs.csv", 0.0, 1.0);
+  number("--moving", faults.moving_share, "Share of points that move, of those in pairs.csv, of a video's image", 0.0,
+         1.0);
   number("--lasting-px", faults.noise_px, "Further noise of each track, which lasts [px]", 0.0, 100.0);
   number("--lasting-s", faults.noise_lasts_s, "How long it lasts [s]", 0.0, 1000.0);
   command.add_flag("!--no-range", args.with_range, "With --depth: without range_m");

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numbers>
 #include <opencv2/core.hpp>
 
+#include "alidade/geometry/so3.h"
 #include "alidade/pantilt/head_rotation.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotating_lens.h"
@@ -39,8 +42,12 @@ Kernel kernel_of(const PanoramaConfig& config) {
 /// error is 1e-6 px), because Newton's steps would cost more than all else.
 class View {
  public:
-  View(const RotatingIntrinsics& k, int width, int height, const Eigen::Quaterniond& base_from_cam)
-      : k_(k), base_from_cam_(base_from_cam.toRotationMatrix().cast<float>()) {
+  using RowAttitude = std::function<Eigen::Quaterniond(int row)>;  ///< base_from_cam while a row is read.
+
+  View(const RotatingIntrinsics& k, int width, int height, int margin, const RowAttitude& base_from_cam)
+      : k_(k), margin_(margin) {
+    for (int row = -margin; row < height + margin; ++row)
+      base_from_cam_.push_back(base_from_cam(row).toRotationMatrix().cast<float>());
     constexpr double beyond = 1.2;  // of the farthest corner: the margin that is blurred into the image
     const double x = beyond * std::max(k.cx, width - k.cx) / k.fx, y = beyond * std::max(k.cy, height - k.cy) / k.fy;
     square_step_ = (x * x + y * y) / num_squares;
@@ -53,7 +60,8 @@ class View {
   [[nodiscard]] Eigen::Vector3f direction(double u, double v) const {
     const auto x = static_cast<float>((u - k_.cx) / k_.fx), y = static_cast<float>((v - k_.cy) / k_.fy);
     const float scale = scale_.empty() ? 1.0f : scale_at(x * x + y * y);
-    return base_from_cam_ * Eigen::Vector3f(scale * x, scale * y, 1.0f);
+    const auto row = std::clamp<std::ptrdiff_t>(std::lround(v) + margin_, 0, std::ssize(base_from_cam_) - 1);
+    return base_from_cam_[static_cast<std::size_t>(row)] * Eigen::Vector3f(scale * x, scale * y, 1.0f);
   }
 
  private:
@@ -66,22 +74,67 @@ class View {
   }
 
   RotatingIntrinsics k_;
-  Eigen::Matrix3f base_from_cam_;
+  int margin_;
+  std::vector<Eigen::Matrix3f> base_from_cam_;  ///< Of each row, from the margin above.
   double square_step_ = 1.0;
   std::vector<float> scale_;  ///< Undistorted over distorted radius, by even steps of the square of the latter.
 };
 
+/// Things that move: discs of the far world that rotate about the camera, each its own way, with what is on them.
+class MovingDiscs {
+ public:
+  MovingDiscs() = default;
+  /// A share of the sphere, as it is at a time; those that a view along `axis` may see.
+  MovingDiscs(double share, double focal_px, double t_s, const Eigen::Vector3f& axis, std::uint64_t seed) {
+    constexpr double radius_px = 40.0, fastest_px_per_s = 20.0, half_view_rad = 1.0;
+    const double radius_rad = radius_px / focal_px, area = std::numbers::pi * radius_rad * radius_rad;
+    const int num = static_cast<int>(-std::log1p(-std::min(share, 0.99)) * 4.0 * std::numbers::pi / area);
+    cos_radius_ = static_cast<float>(std::cos(radius_rad));
+    Draws draws(seed);
+    for (int i = 0; i < num; ++i) {
+      const Eigen::Vector3d at = Eigen::Vector3d(draws.normal(), draws.normal(), draws.normal()).normalized();
+      const Eigen::Vector3d across = at.cross(Eigen::Vector3d(draws.normal(), draws.normal(), draws.normal()));
+      const double rate = draws.uniform(0.2, 1.0) * fastest_px_per_s / focal_px;
+      const Eigen::Matrix3f moved = exp_so3(rate * t_s * across.normalized()).toRotationMatrix().cast<float>();
+      const Eigen::Vector3f now = moved * at.cast<float>();
+      if (now.dot(axis) > std::cos(half_view_rad)) discs_.push_back({now, moved.transpose()});
+    }
+  }
+
+  /// Where the light from a direction was while nothing had moved.
+  [[nodiscard]] Eigen::Vector3f origin(const Eigen::Vector3f& direction) const {
+    const float limit = cos_radius_ * (discs_.empty() ? 0.0F : direction.norm());
+    for (const Disc& disc : discs_)
+      if (disc.at.dot(direction) > limit) return disc.back * direction;
+    return direction;
+  }
+
+ private:
+  struct Disc {
+    Eigen::Vector3f at;
+    Eigen::Matrix3f back;
+  };
+  std::vector<Disc> discs_;
+  float cos_radius_ = 1.0F;
+};
+
 /// Paints what will be seen: a look at every eighth pixel, and as far around it.
-void prepare(FarWorld& world, const View& view, double focal_px, int width, int height, int margin) {
+void prepare(FarWorld& world, const View& view, const MovingDiscs& discs, double focal_px, int width, int height,
+             int margin) {
   constexpr int step_px = 8;
   std::vector<Eigen::Vector3f> directions;
   for (int v = -margin; v < height + margin + step_px; v += step_px)
-    for (int u = -margin; u < width + margin + step_px; u += step_px) directions.push_back(view.direction(u, v));
+    for (int u = -margin; u < width + margin + step_px; u += step_px) {
+      directions.push_back(view.direction(u, v));
+      const Eigen::Vector3f origin = discs.origin(directions.back());
+      if (origin != directions.back()) directions.push_back(origin);
+    }
   world.prepare(directions, step_px / focal_px);
 }
 
 /// Light per pixel, before the noise.
-RowMajorF light_of(const FarWorld& world, const View& view, int width, int height, const PanoramaConfig& config) {
+RowMajorF light_of(const FarWorld& world, const View& view, const MovingDiscs& discs, int width, int height,
+                   const PanoramaConfig& config) {
   const int n = config.oversampling;
   const Kernel kernel = kernel_of(config);
   const int cols = (width + 2 * kernel.reach) * n, rows = (height + 2 * kernel.reach) * n;
@@ -89,7 +142,8 @@ RowMajorF light_of(const FarWorld& world, const View& view, int width, int heigh
   tbb::parallel_for(0, rows, [&](int row) {
     Eigen::VectorXf samples(cols);
     const double v = (row + 0.5) / n - kernel.reach - 0.5;
-    for (int i = 0; i < cols; ++i) samples[i] = world.grey(view.direction((i + 0.5) / n - kernel.reach - 0.5, v));
+    for (int i = 0; i < cols; ++i)
+      samples[i] = world.grey(discs.origin(view.direction((i + 0.5) / n - kernel.reach - 0.5, v)));
     for (int u = 0; u < width; ++u) across(row, u) = samples.segment(u * n, kernel.weights.size()).dot(kernel.weights);
   });
   tbb::parallel_for(0, height, [&](int v) {
@@ -98,13 +152,13 @@ RowMajorF light_of(const FarWorld& world, const View& view, int width, int heigh
   return light;
 }
 
-}  // namespace
-
-cv::Mat render_panorama(FarWorld& world, const RotatingIntrinsics& intrinsics, int width_px, int height_px,
-                        const Eigen::Quaterniond& base_from_cam, const PanoramaConfig& config, std::uint64_t seed) {
-  const View view(intrinsics, width_px, height_px, base_from_cam);
-  prepare(world, view, std::min(intrinsics.fx, intrinsics.fy), width_px, height_px, kernel_of(config).reach + 1);
-  const RowMajorF light = light_of(world, view, width_px, height_px, config);
+cv::Mat render(FarWorld& world, const RotatingIntrinsics& intrinsics, int width_px, int height_px,
+               const View::RowAttitude& base_from_cam, const MovingDiscs& discs, const PanoramaConfig& config,
+               std::uint64_t seed) {
+  const int margin = kernel_of(config).reach + 1;
+  const View view(intrinsics, width_px, height_px, margin, base_from_cam);
+  prepare(world, view, discs, std::min(intrinsics.fx, intrinsics.fy), width_px, height_px, margin);
+  const RowMajorF light = light_of(world, view, discs, width_px, height_px, config);
   Draws draws(seed);
   cv::Mat frame(height_px, width_px, CV_8U);
   for (int v = 0; v < height_px; ++v) {
@@ -118,6 +172,14 @@ cv::Mat render_panorama(FarWorld& world, const RotatingIntrinsics& intrinsics, i
   return frame;
 }
 
+}  // namespace
+
+cv::Mat render_panorama(FarWorld& world, const RotatingIntrinsics& intrinsics, int width_px, int height_px,
+                        const Eigen::Quaterniond& base_from_cam, const PanoramaConfig& config, std::uint64_t seed) {
+  return render(
+      world, intrinsics, width_px, height_px, [&](int) { return base_from_cam; }, {}, config, seed);
+}
+
 Eigen::Quaterniond true_base_from_cam(const RotationScene& scene, double t_s) {
   const Eigen::Quaterniond cam_from_mount = exp_so3(scene.mount_rad);
   const Eigen::Quaterniond base_from_mount = base_from_cam_rotation(scene.motion(t_s));
@@ -127,8 +189,18 @@ Eigen::Quaterniond true_base_from_cam(const RotationScene& scene, double t_s) {
 cv::Mat render_panorama_frame(FarWorld& world, const RotationScene& scene, std::size_t k, double rate_hz,
                               const PanoramaConfig& config, std::uint64_t seed) {
   const double t_s = static_cast<double>(k) / rate_hz;
-  return render_panorama(world, scene.intrinsics(t_s), scene.width_px, scene.height_px,
-                         true_base_from_cam(scene, t_s + scene.delay_s), config, seed + 0x9e3779b97f4a7c15u * (k + 1));
+  const RotatingIntrinsics intrinsics = scene.intrinsics(t_s);
+  const auto at_row = [&](int row) {
+    const double late_s = scene.shutter_s * (row - 0.5 * (scene.height_px - 1.0)) / scene.height_px;
+    return true_base_from_cam(scene, t_s + scene.delay_s + late_s);
+  };
+  MovingDiscs discs;
+  if (config.moving_share > 0.0) {
+    const Eigen::Vector3d axis = true_base_from_cam(scene, t_s + scene.delay_s) * Eigen::Vector3d::UnitZ();
+    discs = MovingDiscs(config.moving_share, scene.intrinsics(0.0).fx, t_s, axis.cast<float>(), seed + 5);
+  }
+  return render(world, intrinsics, scene.width_px, scene.height_px, at_row, discs, config,
+                seed + 0x9e3779b97f4a7c15u * (k + 1));
 }
 
 RotationLog panorama_log(const RotationScene& scene, const RotationLogConfig& config, std::uint64_t seed) {

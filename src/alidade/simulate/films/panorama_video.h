@@ -8,9 +8,10 @@
 namespace alidade {
 
 struct PanoramaConfig {
-  double blur_px = 0.6;  ///< σ of the optical blur.
-  double noise = 2.0;    ///< σ of the grey noise, in grey values of 255.
-  int oversampling = 2;  ///< Sub-samples a pixel and axis; more change no edge by 0.002 px (tested).
+  double blur_px = 0.6;       ///< σ of the optical blur.
+  double noise = 2.0;         ///< σ of the grey noise, in grey values of 255.
+  double moving_share = 0.0;  ///< Of a frame of a scene: discs that move by 4 to 20 px a second, with what is on them.
+  int oversampling = 2;       ///< Sub-samples a pixel and axis; more change no edge by 0.002 px (tested).
 };
 
 /// What a camera at the centre of that world sees, 8-bit grey: rays through the lens, the world's light, blurred by the
@@ -23,7 +24,8 @@ struct PanoramaConfig {
 /// points, depths and lever arm play no part. The base is the head's; the mount is off it by scene.mount_rad.
 [[nodiscard]] Eigen::Quaterniond true_base_from_cam(const RotationScene& scene, double t_s);
 
-/// The frame that is taken in row k of panorama_log(): at k / rate, of the world as it is seen delay_s later.
+/// The frame that is taken in row k of panorama_log(): at k / rate, of the world as it is seen delay_s later, its rows
+/// over shutter_s about that.
 [[nodiscard]] cv::Mat render_panorama_frame(FarWorld& world, const RotationScene& scene, std::size_t k, double rate_hz,
                                             const PanoramaConfig& config, std::uint64_t seed);
 

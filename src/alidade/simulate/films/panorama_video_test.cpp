@@ -147,6 +147,47 @@ TEST(Panorama, NoiseIsSeededAndOfItsSigma) {
   EXPECT_NEAR(sigma[0], std::sqrt(2.0 * (2.0 * 2.0 + 1.0 / 12.0)), 0.05);  // 76 800 pixels: ± 0.008
 }
 
+/// Each row of a rolling shutter is what a global one sees at that row's time.
+TEST(PanoramaFrame, RowsOfARollingShutterAreOfTheirTimes) {
+  FarWorld world = FarWorld::of_noise(3.0 / 300.0, 8);
+  RotationScene scene;
+  scene.width_px = width, scene.height_px = height;
+  scene.intrinsics = [](double) { return camera; };
+  scene.motion = [](double t_s) { return Eigen::Vector3d(0.5 * t_s, 0.1 * t_s, 0.0); };
+  const auto frame = [&](double shutter_s, double delay_s) {
+    scene.shutter_s = shutter_s, scene.delay_s = delay_s;
+    return render_panorama_frame(world, scene, 15, 30.0, {.noise = 0.0}, 1);
+  };
+  const cv::Mat rolling = frame(0.06, 0.0);
+  for (const int v : {20, 110, 200}) {
+    const cv::Rect strip(20, v, width - 40, 20);
+    const double late_s = 0.06 * (v + 9.5 - 0.5 * (height - 1)) / height;
+    EXPECT_LT(shift_between(frame(0.0, late_s), rolling, strip).norm(), 0.03) << v;
+    if (v != 110)
+      EXPECT_GT(shift_between(frame(0.0, 0.0), rolling, strip).norm(), 0.5) << v;  // 3 px; beyond its slopes
+  }
+}
+
+/// Of a camera at rest, what differs after two seconds is on things that move.
+TEST(PanoramaFrame, AShareOfTheImageMoves) {
+  RotationScene scene;
+  scene.width_px = width, scene.height_px = height;
+  scene.intrinsics = [](double) { return camera; };
+  scene.motion = [](double) { return Eigen::Vector3d(0.2, 0.1, 0.0); };
+  double share = 0.0;
+  constexpr int worlds = 8;
+  for (std::uint64_t seed = 1; seed <= worlds; ++seed) {
+    FarWorld world = FarWorld::of_noise(3.0 / 300.0, seed);
+    const PanoramaConfig moving{.noise = 0.0, .moving_share = 0.25}, still{.noise = 0.0};
+    const cv::Mat first = render_panorama_frame(world, scene, 0, 30.0, moving, seed);
+    EXPECT_EQ(cv::norm(first, render_panorama_frame(world, scene, 0, 30.0, still, seed), cv::NORM_INF), 0.0);
+    cv::Mat differs;
+    cv::absdiff(first, render_panorama_frame(world, scene, 60, 30.0, moving, seed), differs);
+    share += cv::countNonZero(differs > 1) / static_cast<double>(worlds * width * height);
+  }
+  EXPECT_NEAR(share, 0.25, 0.1);  // some thirty discs, of which a tenth looks alike by chance, and what they uncover
+}
+
 /// The rates of the log rotate the camera as the frames say, off-axis mount and all.
 TEST(PanoramaLog, RatesAreThoseOfTheHead) {
   RotationScene scene;

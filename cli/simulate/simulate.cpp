@@ -102,7 +102,8 @@ ExitCode simulate_board(const BoardArgs& args, Run& run) {
   const BoardSceneConfig config{.num_photos = args.photos,
                                 .max_tilt_rad = args.max_tilt_deg * std::numbers::pi / 180.0,
                                 .bow_m = 1e-3 * args.bow_mm,
-                                .shape_sigma_m = 1e-3 * args.shape_sigma_mm};
+                                .shape_sigma_m = 1e-3 * args.shape_sigma_mm,
+                                .into_corners = true};
   const BoardScene scene = draw_board_scene(camera_from(args, run), board, config, run.options.seed);
   describe_truth(scene, run);
   std::vector<BoardView> views = simulate_views(scene, args.sigma_px, run.options.seed);

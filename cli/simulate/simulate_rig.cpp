@@ -22,7 +22,7 @@ namespace {
 struct SimulateRigArgs {
   std::string scenario = "reference";
   std::filesystem::path rig;
-  int boards = 5, views = 4;
+  int boards = 8, views = 4;
   double sigma_px = 0.2, sigma_angle_deg = 0.02, wrong = 0.0;
   double scale = 1.0, once_deg = 0.0, twice_deg = 0.0, backlash_deg = 0.0;
   RigMistake mistake;

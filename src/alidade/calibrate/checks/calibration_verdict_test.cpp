@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "alidade/testing/calibration_sample.h"
+#include "alidade/testing/trials.h"
 
 namespace alidade {
 namespace {
@@ -40,6 +41,23 @@ TEST(CalibrationVerdict, CleanDataIsGood) {
     EXPECT_EQ(result.verdict.checks.size(), 9u);
     for (const Check& check : result.verdict.checks) EXPECT_EQ(check.state, State::good) << check.text;
   }
+}
+
+/// As `alidade simulate board` takes its photos; ALIDADE_TEST_TRIALS=40 draws as many sets.
+TEST(CalibrationVerdict, PhotosIntoTheCornersAreGoodNineteenTimesInTwenty) {
+  const int sets = testing::trials(8);
+  int good = 0;
+  std::string others;
+  for (int set = 1; set <= sets; ++set) {
+    const BoardSceneConfig photos{.num_photos = 20, .into_corners = true};
+    const auto seed = static_cast<std::uint64_t>(set);
+    const BoardScene scene = draw_board_scene(sample_camera("brown"), testing::sample_board, photos, seed);
+    const Verdict verdict = sample_calibration(sample_views(scene, seed)).verdict;
+    good += verdict.state == State::good;
+    if (verdict.state != State::good) others += std::to_string(set) + ": " + verdict.sentence + '\n';
+  }
+  const double misses = 0.05 * sets;  // expected at most, and three standard deviations of that number
+  EXPECT_LE(sets - good, misses + 3.0 * std::sqrt(0.95 * misses)) << others;
 }
 
 TEST(CalibrationVerdict, ItsNumbersAreThoseOfTheStudy) {

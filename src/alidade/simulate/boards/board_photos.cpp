@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "alidade/simulate/boards/board_placing.h"
 #include "alidade/simulate/boards/printed_pattern.h"
@@ -49,33 +50,83 @@ bool sees_all(const Camera& camera, const Rigid3& cam_from_board, const std::vec
 
 namespace {
 
-/// Draws poses until one shows everything; the board moves away a little after every failure.
-Rigid3 draw_pose(const BoardScene& scene, const std::vector<Eigen::Vector3d>& outline, const BoardSceneConfig& config,
-                 Draws& draws) {
-  const Camera& camera = scene.camera;
-  const PrintedPattern pattern(scene.board);
-  const Eigen::Vector2d size = pattern.print_max() - pattern.print_min();
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  centre.head<2>() = 0.5 * (pattern.print_max() + pattern.print_min());
-  const Eigen::VectorXd lens = params(camera.lens);
-  const double distance_at_fill_1 =
-      std::max(lens[0] * size.x() / camera.width_px, lens[1] * size.y() / camera.height_px);
-  double fill = draws.uniform(config.min_fill, config.max_fill);
-  Rigid3 cam_from_board;
-  constexpr int max_tries = 2000;
-  for (int i = 0; i < max_tries; ++i, fill *= 0.995) {
-    const double tilt = config.max_tilt_rad * std::sqrt(draws.uniform());
-    const double azimuth = draws.uniform(0.0, 2.0 * std::numbers::pi), roll = draws.uniform(-0.35, 0.35);
-    const Eigen::Vector3d axis(std::cos(azimuth), std::sin(azimuth), 0.0);
-    cam_from_board.rotation = exp_so3(tilt * axis) * exp_so3({0.0, 0.0, roll});
-    const double v = draws.uniform(0.1, 0.9) * camera.height_px, u = draws.uniform(0.1, 0.9) * camera.width_px;
-    const auto ray = unproject(camera, {u, v});
-    if (!ray) continue;
-    cam_from_board.translation = distance_at_fill_1 / fill / ray->z() * *ray - cam_from_board.rotation * centre;
-    if (sees_all(camera, cam_from_board, outline)) break;
+/// Draws poses of a scene's board in which all of it is seen.
+class PoseDraws {
+ public:
+  PoseDraws(const BoardScene& scene, const BoardSceneConfig& config, Draws& draws)
+      : scene_(scene), config_(config), draws_(draws), outline_(visible_outline(scene)) {
+    const PrintedPattern pattern(scene.board);
+    const Eigen::Vector2d size = pattern.print_max() - pattern.print_min();
+    centre_.head<2>() = 0.5 * (pattern.print_max() + pattern.print_min());
+    const Camera& camera = scene.camera;
+    const Eigen::VectorXd lens = params(camera.lens);
+    distance_at_fill_1_ = std::max(lens[0] * size.x() / camera.width_px, lens[1] * size.y() / camera.height_px);
   }
-  return cam_from_board;
-}
+
+  /// Draws until one shows everything; the board moves away a little after every failure. `least_tilt` is a share of
+  /// the largest.
+  Rigid3 next(double least_tilt = 0.0) {
+    double fill = draws_.uniform(config_.min_fill, config_.max_fill);
+    Rigid3 cam_from_board;
+    constexpr int max_tries = 2000;
+    for (int i = 0; i < max_tries; ++i, fill *= 0.995) {
+      const std::optional<Rigid3> drawn = draw_at(fill, least_tilt);
+      if (!drawn) continue;
+      cam_from_board = *drawn;
+      if (sees_all(scene_.camera, cam_from_board, outline_)) break;
+    }
+    return cam_from_board;
+  }
+
+  /// Of several tilted ones that show everything, the one whose points come nearest to this corner of the image.
+  Rigid3 next_into(const Eigen::Vector2d& corner_px) {
+    constexpr int num_drawn = 150;
+    constexpr double least_tilt = 0.5;  // of the largest: boards that face the camera do not determine f
+    Rigid3 nearest;
+    double least_px = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < num_drawn; ++i) {
+      const Rigid3 drawn = next(least_tilt);
+      if (!sees_all(scene_.camera, drawn, outline_)) return drawn;  // no pose fits: no use in drawing on
+      const double px = distance_px(drawn, corner_px);
+      if (!(px < least_px) && i > 0) continue;
+      least_px = px;
+      nearest = drawn;
+    }
+    return nearest;
+  }
+
+ private:
+  std::optional<Rigid3> draw_at(double fill, double least_tilt = 0.0) {
+    const Camera& camera = scene_.camera;
+    const double tilt = config_.max_tilt_rad * std::sqrt(draws_.uniform(least_tilt * least_tilt, 1.0));
+    const double azimuth = draws_.uniform(0.0, 2.0 * std::numbers::pi), roll = draws_.uniform(-0.35, 0.35);
+    const Eigen::Vector3d axis(std::cos(azimuth), std::sin(azimuth), 0.0);
+    Rigid3 cam_from_board;
+    cam_from_board.rotation = exp_so3(tilt * axis) * exp_so3({0.0, 0.0, roll});
+    const double v = draws_.uniform(0.1, 0.9) * camera.height_px, u = draws_.uniform(0.1, 0.9) * camera.width_px;
+    const auto ray = unproject(camera, {u, v});
+    if (!ray) return std::nullopt;
+    cam_from_board.translation = distance_at_fill_1_ / fill / ray->z() * *ray - cam_from_board.rotation * centre_;
+    return cam_from_board;
+  }
+
+  /// Of the nearest of the board's points.
+  [[nodiscard]] double distance_px(const Rigid3& cam_from_board, const Eigen::Vector2d& corner_px) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector3d& point : scene_.points_in_board) {
+      const auto px = project(scene_.camera, cam_from_board * point);
+      if (px) least = std::min(least, (*px - corner_px).norm());
+    }
+    return least;
+  }
+
+  const BoardScene& scene_;
+  const BoardSceneConfig& config_;
+  Draws& draws_;
+  std::vector<Eigen::Vector3d> outline_;
+  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  double distance_at_fill_1_ = 0.0;
+};
 
 }  // namespace
 
@@ -83,8 +134,14 @@ BoardScene draw_board_scene(const Camera& camera, const Board& board, const Boar
                             std::uint64_t seed) {
   Draws draws(seed);
   BoardScene scene{camera, board, draw_bent_points(board, config, draws), {}};
-  const std::vector<Eigen::Vector3d> outline = visible_outline(scene);
-  for (int i = 0; i < config.num_photos; ++i) scene.cam_from_board.push_back(draw_pose(scene, outline, config, draws));
+  PoseDraws poses(scene, config, draws);
+  for (int i = 0; i < config.num_photos; ++i) {
+    const int corner = i / 2 % 4;  // left and right in turn
+    const Eigen::Vector2d px(corner % 2 == 0 ? 0.0 : camera.width_px - 1.0,
+                             corner % 3 == 0 ? 0.0 : camera.height_px - 1.0);
+    const bool is_aimed = config.into_corners && i % 2 == 1;
+    scene.cam_from_board.push_back(is_aimed ? poses.next_into(px) : poses.next());
+  }
   return scene;
 }
 

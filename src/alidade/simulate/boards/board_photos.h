@@ -28,6 +28,7 @@ struct BoardSceneConfig {
   double min_fill = 0.35, max_fill = 0.9;  ///< Printed size over image size, whichever axis is fuller.
   double bow_m = 0.0;          ///< Height of the bow in the board's centre over its corners, away from the camera. [m]
   double shape_sigma_m = 0.0;  ///< Scatter of every point, in and out of plane. [m]
+  bool into_corners = false;   ///< Every other photo is held into a corner of the image, as one is advised to.
 };
 
 /// Draws a scene in which every point of every board is seen. Same seed, same scene.

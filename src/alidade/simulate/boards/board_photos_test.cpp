@@ -69,6 +69,28 @@ TEST(BoardScene, ShowsEveryPointWithinItsTilt) {
   }
 }
 
+/// Mean over the corners of the image of how far the nearest of eight photos' points is. [px]
+double unseen_px(bool into_corners, std::uint64_t seed) {
+  const BoardSceneConfig config{.num_photos = 8, .into_corners = into_corners};
+  const BoardScene scene = draw_board_scene(wide_brown(), Board{}, config, seed);
+  double sum = 0.0;
+  for (const Eigen::Vector2d& corner :
+       {Eigen::Vector2d(0, 0), Eigen::Vector2d(799, 0), Eigen::Vector2d(0, 599), Eigen::Vector2d(799, 599)}) {
+    double nearest = 1e9;
+    for (std::size_t i = 0; i < 8; ++i) {
+      for (const Eigen::Vector2d& px : true_corners(scene, i)) nearest = std::min(nearest, (px - corner).norm());
+    }
+    sum += nearest / 4.0;
+  }
+  return sum;
+}
+
+TEST(BoardScene, IsHeldIntoEachCornerOfTheImage) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    EXPECT_LT(unseen_px(true, seed), 0.8 * unseen_px(false, seed)) << seed;
+  }
+}
+
 TEST(BoardScene, SameSeedSameSceneAnotherSeedAnother) {
   const auto translation = [](std::uint64_t seed) {
     return draw_board_scene(wide_brown(), Board{}, {.num_photos = 3}, seed).cam_from_board[2].translation;

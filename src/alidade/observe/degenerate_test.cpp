@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -69,6 +70,11 @@ ObserveSetup config_of(ObserveMethod method) {
   config.width_px = 780;
   config.height_px = 582;
   return config;
+}
+
+bool has_event(const ObserveSolution& report, ObserveEvent event) {
+  return std::any_of(report.events.begin(), report.events.end(),
+                     [&](const ObserveNote& note) { return note.event == event; });
 }
 
 TEST(ObserveDegenerate, EveryOneIsRefusedByNameWithEveryMethod) {
@@ -167,6 +173,30 @@ TEST(ObserveDegenerate, DistortionOrAWrongMountIsNotTakenForAZoom) {
     const ObserveSolution report = solve_intrinsics(log, config);
     EXPECT_NE(report.status, ObserveSolution::Status::focal_length_varies) << "seed " << seed;
   }
+}
+
+/// Rows before a step of the zoom are of another focal length, and not outliers of all rows together.
+TEST(ObserveDegenerate, AStepOfTheZoomIsFollowedAndTheAnswerIsGood) {
+  constexpr int sets = 20;
+  int good = 0;
+  for (std::uint64_t seed = 1; seed <= sets; ++seed) {
+    RotationScene scene;
+    scene.motion = paper_rate;
+    scene.intrinsics = [](double t_s) {
+      const double zoom = t_s < 6.0 ? 1.0 : 1.1;
+      return RotatingIntrinsics{.fx = 710.0 * zoom, .fy = 700.0 * zoom, .cx = 390.0, .cy = 290.0};
+    };
+    scene.start_px = draw_points(780, 582, 4, seed);
+    const RotationLog log = simulate_rotation(scene, {}, seed);
+    const ObserveSetup config = config_of(ObserveMethod::hybrid);
+    const ObserveSolution report = solve_intrinsics(log, config);
+    const Verdict verdict = observe_verdict(report, log, config);
+    good += verdict.state == State::good;
+    EXPECT_TRUE(has_event(report, ObserveEvent::zoom)) << "seed " << seed;
+    EXPECT_NEAR(report.quantities[0].value, 781.0, 5.0 * report.quantities[0].sigma) << "seed " << seed;
+    EXPECT_NE(verdict.state, State::bad) << "seed " << seed << ": " << verdict.to_add;
+  }
+  EXPECT_GE(good, sets - 1);
 }
 
 }  // namespace

@@ -63,19 +63,27 @@ bool has_zoom(const ObserveSolution& report) {
   });
 }
 
+/// Of the pixels that it is of.
+double rejected_share(const ObserveSolution& report) {
+  const auto out = static_cast<double>(report.pixels_rejected);
+  return out / std::max(1.0, out + static_cast<double>(report.reference.bundle.observations.size()));
+}
+
 /// What is not modelled, and errors that last, may look like zooms, and each rest between them be explained by itself.
 /// Where all rows fit one camera nearly as well there was no zoom: theirs is the answer. Where they do not but are
 /// steady, what they ask for counts.
 void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
                   ObserveSolution& report) {
   constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
+  constexpr double more = 0.05;  // of the pixels: rows of another focal length are rejected together, and raise nothing
   const bool is_known = config.rotation == RotationKnowledge::known;
   if (!has_zoom(report) || !is_known || !is_answer(report) || config.method != ObserveMethod::hybrid) return;
   ObserveSetup whole = config;
   whole.method = ObserveMethod::batch;
   ObserveSolution all = solve_as_given(log, whole, progress);
   if (!is_answer(all)) return;
-  if (all.sigma_px < nearly * report.sigma_px || config.no_zoom) {
+  const bool rejects_rows = rejected_share(all) > rejected_share(report) + more;
+  if ((all.sigma_px < nearly * report.sigma_px && !rejects_rows) || config.no_zoom) {
     const IntrinsicsEstimate last = all.steps.back();
     all.steps = std::move(report.steps);
     all.steps.back() = last;
@@ -85,7 +93,7 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
     return;
   }
   constexpr double far_off = 3.0;  // the noise of one camera's rows beside a real zoom's: nothing is determined by them
-  if (all.sigma_px > far_off * report.sigma_px) return;
+  if (rejects_rows || all.sigma_px > far_off * report.sigma_px) return;
   const CauseScore* best = best_cause(all);
   if (best == nullptr || best->name == "focal length that drifts") return;
   const CauseScore* known = best_cause(report);

@@ -110,7 +110,7 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     buffer_.add(frame, px_);
     if (adjust_buffer()) filter_.observe(frame, px_);
     judgement = judge();
-    judgement.accept = true;
+    judgement.accept = judgement.is_adjusted = true;
     for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.set_rejected(i, true);  // they are in already
   }
   if (judgement.event == ObserveEvent::burst && !config_.no_zoom && is_zoom(frame)) {
@@ -194,6 +194,7 @@ int HybridObserver::drifting_point() const {
 
 void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgement) {
   last_fit_s_ = frame.t_s;
+  if (judgement.is_adjusted) return;  // its points did not slip, and the buffer has it
   if (!is_zooming_) {
     sum_nis_ += judgement.nis;
     sum_dof_ += judgement.dof;

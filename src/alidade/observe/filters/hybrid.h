@@ -60,6 +60,7 @@ class HybridObserver {
     double nis = 0.0;
     int dof = 0;
     bool accept = true;
+    bool is_adjusted = false;  ///< The frame is in the filter by an adjustment of all.
   };
 
   void normalise(const RotationFrame& frame);

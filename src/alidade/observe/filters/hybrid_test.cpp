@@ -82,6 +82,27 @@ struct Errors {
   }
 };
 
+/// A σ that is three times too small makes each frame a burst while the answer is coarse: adjusted with all before it,
+/// whose points have not slipped for that.
+TEST(Hybrid, PointsOfFramesThatWereAdjustedHaveNotSlipped) {
+  Experiment experiment = paper_experiment(3.0);
+  const RotationLog log = log_of(experiment, 0);
+  HybridConfig config;
+  config.num_points = 4, config.scale = paper_scale;
+  config.start.k = {500.0 / 400.0, 510.0 / 400.0, 10.0 / 400.0, 9.0 / 400.0};
+  config.start_is_given = true, config.sigma_px = 0.1, config.fine_enough = 1e-6;  // coarse all the time
+  HybridObserver observer(config);
+  MotionReader reader(log.source, 0.25);
+  int num_bursts = 0, num_forgotten = 0;
+  for (const RotationRow& row : log.rows) {
+    num_bursts += observer.step(reader.next(row)).event == ObserveEvent::burst;
+    if (!observer.is_running()) continue;
+    for (std::size_t i = 0; i < 4; ++i) num_forgotten += !observer.filter().has_point(i);
+  }
+  EXPECT_GT(num_bursts, 5);
+  EXPECT_EQ(num_forgotten, 0);
+}
+
 /// The paper's experiment 1: its noise on one coordinate of each point.
 TEST(Hybrid, IsWithinOnePercentByTwoSecondsOfThePapersNoise) {
   std::vector<double> within_s;

@@ -1,12 +1,13 @@
 #include "alidade/calibrate/study.h"
-#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "alidade/calibrate/checks/heldout.h"
 #include "alidade/calibrate/checks/residual_structure.h"
+#include "alidade/estimation/median.h"
 
 namespace alidade {
 namespace {
@@ -21,6 +22,17 @@ double median_distance_m(const CalibrateReport& report) {
   return median_of(std::move(distances));
 }
 
+/// What the largest of `num` normal deviates exceeds as seldom as one exceeds 3, once in 370 (Bonferroni).
+double limit_of_largest(std::size_t num) {
+  const double chance = std::erfc(3.0 / std::numbers::sqrt2) / static_cast<double>(std::max<std::size_t>(num, 1));
+  double low = 3.0, high = 6.0;
+  while (high - low > 1e-6) {
+    const double middle = 0.5 * (low + high);
+    (std::erfc(middle / std::numbers::sqrt2) > chance ? low : high) = middle;
+  }
+  return high;
+}
+
 /// Both halves calibrated apart, on one board shape.
 std::optional<Halves> compare_halves(const Board& board, std::span<const BoardView> views, ImageSize size,
                                      CalibrateConfig config, const std::vector<Eigen::Vector3d>& board_points) {
@@ -33,14 +45,17 @@ std::optional<Halves> compare_halves(const Board& board, std::span<const BoardVi
   }
   const auto diff = diff_cameras(a.camera, b.camera, {.cols = 30, .rows = 20});
   if (!diff) return std::nullopt;
-  Halves halves{*diff, 0.0, ""};
+  Halves halves{*diff, 0.0, 0.0, ""};
+  std::size_t num_compared = 0;
   for (const ParameterDiff& row : halves.diff.parameters) {
-    const double z = std::abs(row.b - row.a) / std::hypot(row.sigma_a, row.sigma_b);
+    const double sigma = std::hypot(row.sigma_a, row.sigma_b), z = std::abs(row.b - row.a) / sigma;
+    num_compared += sigma > 0.0 ? 1 : 0;
     if (z > halves.worst_z) {
       halves.worst_z = z;
       halves.worst_name = row.name;
     }
   }
+  halves.limit = limit_of_largest(num_compared);
   return halves;
 }
 

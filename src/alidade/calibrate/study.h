@@ -41,6 +41,7 @@ struct HeldOutModel {
 struct Halves {
   CameraDiff diff;       ///< Second minus first over the image.
   double worst_z = 0.0;  ///< Largest |difference| of a parameter in its σ.
+  double limit = 3.0;    ///< What the largest of so many exceeds by chance once in 370: 3.6 of nine.
   std::string worst_name;
 };
 

@@ -23,7 +23,7 @@ struct Hover {
   double sigma_px = 0.5, sigma_known_m = 0.001;
   double lasting = 0.0;  ///< Correlation of a point's pixel errors from frame to frame: as a drifting track has them.
   double distance_m = 0.9;
-  bool turns_in_place = false;
+  double sway = 1.0;  ///< Share of its translation: at 0 it rotates in place.
   // What is not as given.
   double readout_s = 0.0;           ///< From the first row to the last, the time being that of the central one.
   double target_speed_m_s = 0.0;    ///< Along x, against the other points.
@@ -128,7 +128,7 @@ inline Motion motion_of(const Hover& scene, Draws& draws) {
     motion.frequency_hz[i] = draws.uniform(0.1, 0.3);
     motion.phase[i] = draws.uniform(0.0, 2.0 * std::numbers::pi);
   }
-  if (scene.turns_in_place) motion.amplitude.head<3>().setZero();
+  motion.amplitude.head<3>() *= scene.sway;
   return motion;
 }
 

@@ -112,7 +112,8 @@ Check consistent(const CalibrationStudy& study) {
     return check;
   }
   check.value = study.halves->worst_z;
-  check.state = grade(check.value, 3.0, 6.0);
+  check.limit = study.halves->limit;
+  check.state = grade(check.value, check.limit, 6.0);
   check.text = "halves differ by " + two(check.value) + "σ in " + study.halves->worst_name;
   return check;
 }

@@ -65,9 +65,9 @@ bool PathSmoother::fix_weakest(const SmoothedPath& path) {
 
 namespace {
 
-/// Whether the positions of a path differ by little more than they are uncertain.
-bool is_from_one_place(const SmoothedPath& path) {
-  constexpr double apart = 12.0;
+/// Whether the positions of a path differ by little of the distance, and by little more than they are uncertain.
+bool is_from_one_place(const SmoothedPath& path, const Eigen::Vector3d& target) {
+  constexpr double apart = 12.0, parallax = 0.05;
   const double num = static_cast<double>(path.cov.size());
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (const Rigid3& pose : path.world_from_cam) centre += pose.translation / num;
@@ -76,14 +76,15 @@ bool is_from_one_place(const SmoothedPath& path) {
     spread_m2 += (path.world_from_cam[k].translation - centre).squaredNorm() / num;
     variance_m2 += path.cov[k].topLeftCorner<3, 3>().trace() / num;
   }
-  return spread_m2 < apart * apart * variance_m2;
+  const double aside_m = parallax * (centre - target).norm();
+  return spread_m2 < std::min(apart * apart * variance_m2, aside_m * aside_m);
 }
 
 }  // namespace
 
 void PathSmoother::widen(double min_cost, SmoothedPath& path) {
   if (!fix_weakest(path)) return;
-  path.is_from_one_place = is_from_one_place(path);
+  path.is_from_one_place = is_from_one_place(path, target_centre_);
   constexpr double sides = 3.0, most = 4.0, little = 0.5;
   const SmootherState best = state_;
   const double sigma = fixed_->value;

@@ -1,0 +1,78 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "alidade/testing/hover.h"
+#include "alidade/testing/trials.h"
+
+namespace alidade {
+namespace {
+
+using testing::HoverLens;
+
+struct Outcome {
+  Localization result;
+  double sigmas = 0.0;  ///< The worst coordinate of a position, in its σ.
+};
+
+Outcome outcome_of(HoverLens lens, int num_others, double sway, int draw) {
+  const testing::Hover scene{.lens = lens, .num_frames = 60, .num_others = num_others, .sway = sway};
+  const testing::HoverRun run = testing::hovering(scene, static_cast<std::uint64_t>(100 + draw));
+  LocalizeConfig config;
+  config.target.points = run.target;
+  config.filter.sigma_px = scene.sigma_px;
+  Camera camera = run.camera;
+  camera.cov = Eigen::MatrixXd::Identity(params(camera.lens).size(), params(camera.lens).size()) * 1e-10;
+  Localizer localizer(camera, config);
+  for (const ObservationFrame& frame : run.frames) localizer.push(frame);
+  Outcome outcome{localizer.finish({})};
+  for (std::size_t k = 0; k < outcome.result.path.size(); ++k) {
+    const PathStep& step = outcome.result.path[k];
+    if (!step.has_pose()) continue;
+    const Eigen::Array3d error = step.world_from_cam.translation - run.truth[k].world_from_cam.translation;
+    const Eigen::Array3d sigma = step.cov.diagonal().head<3>().cwiseSqrt();
+    outcome.sigmas = std::max(outcome.sigmas, (error / sigma).abs().maxCoeff());
+  }
+  return outcome;
+}
+
+class OnePlaceOf : public ::testing::TestWithParam<std::pair<HoverLens, int>> {};
+
+/// The camera moves by a seventh of the distance, with a wide lens and its large σ as well.
+TEST_P(OnePlaceOf, ACameraThatTranslatesIsGood) {
+  const auto [lens, others] = GetParam();
+  const int draws = testing::trials(2);
+  int good = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    const Outcome outcome = outcome_of(lens, others, 1.0, draw);
+    EXPECT_FALSE(outcome.result.is_from_one_place) << outcome.result.verdict.sentence;
+    good += outcome.result.verdict.state == State::good ? 1 : 0;
+    EXPECT_LT(outcome.sigmas, 5.0) << draw;
+  }
+  EXPECT_GE(good, draws - draws / 20) << good << " of " << draws;
+}
+
+/// Of one that rotates in place, or hardly moves, either is true.
+TEST_P(OnePlaceOf, NamedOrSigmaHolds) {
+  const auto [lens, others] = GetParam();
+  for (const double sway : {0.0, 0.2, 0.4}) {
+    for (int draw = 0; draw < testing::trials(1); ++draw) {
+      const Outcome outcome = outcome_of(lens, others, sway, draw);
+      if (outcome.result.verdict.state == State::good) EXPECT_LT(outcome.sigmas, 5.0) << sway << " " << draw;
+    }
+  }
+}
+
+TEST(OnePlace, RotationInPlaceIsNamed) {
+  const Outcome outcome = outcome_of(HoverLens::brown, 0, 0.0, 0);
+  EXPECT_EQ(outcome.result.verdict.state, State::care);
+  EXPECT_TRUE(outcome.result.verdict.sentence.find("hardly translates") != std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lenses, OnePlaceOf,
+                         ::testing::Values(std::pair{HoverLens::brown, 0}, std::pair{HoverLens::fisheye, 60},
+                                           std::pair{HoverLens::fisheye, 0}, std::pair{HoverLens::port, 60}));
+
+}  // namespace
+}  // namespace alidade

@@ -23,7 +23,7 @@ constexpr std::string_view focal_length = "focal length";
 using Profile = LensChange::Profile;
 constexpr double care_sigmas = 2.0;
 /// Of a change of the focal length that is included in σ, though it may be chance (one clean set in 20 drifts, and one
-/// in 20 jumps somewhere): where it is proved the first photo is off by 5σ already.
+/// in 50 jumps somewhere): where it is proved the first photo is off by 5σ already.
 double included_from(Profile profile) { return profile == Profile::drift ? 2.0 : 3.5; }
 
 /// What could change, as a direction in the lens parameters, and what each view says of it: its score γ, its

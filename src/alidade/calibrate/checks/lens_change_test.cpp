@@ -71,7 +71,7 @@ double sigmas_off(const Calibration& result, const Camera& truth) {
 
 std::uint64_t seed_of(int draw) { return static_cast<std::uint64_t>(draw + 1); }
 
-// One set in 100 shows a change by chance: of 20 two do in one run of 60.
+// One set in 200 shows a change by chance, one in 20 a drift that is not proved.
 TEST(LensChange, ALensThatStaysIsGood) {
   const int draws = trials(5);
   int named = 0, good = 0;
@@ -80,7 +80,7 @@ TEST(LensChange, ALensThatStaysIsGood) {
     named += check_named(result.verdict, "same lens").state == State::good ? 0 : 1;
     good += result.verdict.state == State::good ? 1 : 0;
   }
-  EXPECT_LE(named, draws < 20 ? 0 : 1 + draws / 50) << named << " of " << draws;
+  EXPECT_LE(named, draws / 50) << named << " of " << draws;
   EXPECT_GE(good, draws - 1 - draws / 20) << good << " of " << draws;
 }
 
@@ -94,8 +94,9 @@ TEST(LensChange, ADriftOfTheStatedSizeIsSeen) {
     const LensChangeStudy study = study_of(changing_views(drift(size), seed_of(draw)));
     ASSERT_TRUE(study.change);
     seen += study.change->is_proved && study.change->what == "focal length" ? 1 : 0;
-    if (study.change->profile != LensChange::Profile::drift) continue;  // a jump comes near enough to it
-    EXPECT_NEAR(study.change->size, size, 5.0 * study.change->sigma);
+    // Wherever a jump divides a drift, the means before and after it differ by half of the drift.
+    const double expected = study.change->profile == LensChange::Profile::drift ? size : 0.5 * size;
+    EXPECT_NEAR(study.change->size, expected, 5.0 * study.change->sigma);
   }
   EXPECT_GE(seen, draws - 1 - draws / 20) << seen << " of " << draws;
 }
@@ -135,9 +136,9 @@ TEST(LensChange, AShellsOrderIsNotTheOrderTaken) {
   EXPECT_THAT(result.verdict.sentence, HasSubstr("before img16.png"));
 }
 
-/// The lens of the mean, which is stated, is never far off with a good verdict. That of the first photo or the last is
-/// where the drift is not seen: by half a percent, which puts them 6σ off, it is one of 3.5σ, and one set in twelve
-/// shows less than 2σ of it.
+/// Whichever lens is meant, that of the first photo, the last, or the mean: no good verdict is far off. (Of half a
+/// percent, 3.5σ of a drift that puts the ends 6σ off, one set in twelve shows less than 2σ: of 20 draws 3 are silent
+/// there.)
 TEST(LensChange, NoSilentDrift) {
   const int draws = trials(2);
   for (const double size : {0.002, 0.003, 0.005, 0.006, 0.01, 0.02}) {
@@ -150,7 +151,7 @@ TEST(LensChange, NoSilentDrift) {
       for (const double place : {0.0, 1.0}) worst = std::max(worst, sigmas_off(result, camera_at(drift(size), place)));
       silent += worst > 5.0 ? 1 : 0;
     }
-    EXPECT_LE(silent, draws / 5) << size << ": " << silent << " of " << draws;
+    EXPECT_LE(silent, draws / 20) << size << ": " << silent << " of " << draws;
   }
 }
 

@@ -195,13 +195,16 @@ std::optional<OtherLensKind> other_lens_kind(std::span<const ObservationFrame> f
   const auto is_better = [](const Explained& a, const Explained& b) {
     return a.cost < far_better * b.cost && a.cost + least_gain < b.cost;
   };
+  // The other kinds first: where none explains enough, the given one need not be solved again.
+  std::vector<Solved> others;
+  for (const std::string_view kind : kinds)
+    if (kind != given_kind) others.push_back(solved(as_kind(kind, given)));
+  if (std::ranges::none_of(others, [](const Solved& other) { return other.explained.share() >= well; }))
+    return std::nullopt;
   Explained of_given = solved(given).explained;
   std::optional<Solved> best;
-  for (const std::string_view kind : kinds) {
-    if (kind == given_kind) continue;
-    Solved other = solved(as_kind(kind, given));
+  for (Solved& other : others)
     if (is_better(other.explained, best ? best->explained : of_given)) best = std::move(other);
-  }
   if (!best || best->explained.share() < well) return std::nullopt;
   const Explained nearest = solved(nearest_of_kind(given, best->camera, frames)).explained;
   if (nearest.cost < of_given.cost) of_given = nearest;

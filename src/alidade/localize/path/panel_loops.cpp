@@ -60,6 +60,37 @@ ALIDADE_VECTOR_CLONES void loop_subtract_tile(const double* a, const double* b, 
   }
 }
 
+/// From a tile of a matrix of which so many rows and columns are left from there on.
+void subtract(const Tile& tile, double* from, std::size_t stride, int rows_left, int columns_left) {
+  for (int j = 0; j < std::min(4, columns_left); ++j, from += stride) {
+    if (rows_left >= panel) {
+      store(at(from).four - tile.low[j], from);
+      store(at(from + 4).four - tile.high[j], from + 4);
+      continue;
+    }
+    for (int i = 0; i < rows_left; ++i) from[i] -= i < 4 ? tile.low[j][i] : tile.high[j][i - 4];
+  }
+}
+
+ALIDADE_VECTOR_CLONES void loop_subtract_lower(const double* a, const double* b, int num, int dim, double* B,
+                                               std::size_t stride) {
+  for (int column = 0; column < dim; column += 4) {
+    for (int row = column / panel * panel; row < dim; row += panel) {
+      const double *rows = a + row * num, *factors = b + column / panel * panel * num + column % panel;
+      Tile tile;
+      for (int k = 0; k < num; ++k, rows += panel, factors += panel) {
+        const Four low = at(rows).four, high = at(rows + 4).four;
+        for (int j = 0; j < 4; ++j) {
+          const Four factor = {factors[j], factors[j], factors[j], factors[j]};
+          tile.low[j] += low * factor;
+          tile.high[j] += high * factor;
+        }
+      }
+      subtract(tile, B + static_cast<std::size_t>(column) * stride + row, stride, dim - row, dim - column);
+    }
+  }
+}
+
 ALIDADE_VECTOR_CLONES void loop_combine_columns(const double* block, std::size_t stride, double* columns,
                                                 std::size_t num) {
   const double *b0 = block, *b1 = block + stride, *b2 = b1 + stride;
@@ -182,6 +213,9 @@ void mirror_tile(const double* tile, double* mirror, std::size_t stride) {
 
 void subtract_tile(const double* a, const double* b, int num, double* P, double* mirror, std::size_t stride) {
   loop_subtract_tile(a, b, num, P, mirror, stride);
+}
+void subtract_lower(const double* a, const double* b, int num, int dim, double* B, std::size_t stride) {
+  loop_subtract_lower(a, b, num, dim, B, stride);
 }
 void combine_columns(const double* block, std::size_t stride, double* columns, std::size_t num) {
   loop_combine_columns(block, stride, columns, num);

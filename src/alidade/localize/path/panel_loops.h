@@ -5,8 +5,8 @@
 
 #include "alidade/localize/filter/state_covariance.h"
 
-// The inner loops of state_covariance.h, for matrices that stand column by column, `stride` apart, and for panels:
-// eight rows together, column by column.
+// The inner loops of state_covariance.h and pose_chain.h, for matrices that stand column by column, `stride` apart, and
+// for panels: eight rows together, column by column.
 
 namespace alidade::panel_loops {
 
@@ -53,6 +53,9 @@ void weigh_panel(const double* P, std::size_t stride, const int* columns, int nu
                  double* x);
 /// S −= H W Wᵀ Hᵀ.
 void subtract_squares(const PanelWeights& weights, int num_columns, double& s00, double& s01, double& s11);
+/// B(i, j) −= Σ_k a_k[i] b_k[j] of `dim` rows and columns, on and below the diagonal; of tiles on it all is written.
+/// a, b: `num` columns in panels, zero beyond `dim`.
+void subtract_lower(const double* a, const double* b, int num, int dim, double* B, std::size_t stride);
 /// w = x M of a panel, M upper triangular, row-major.
 void times_triangle(const double* x, const double* M, int num, double* w);
 

@@ -181,7 +181,7 @@ void PathSmoother::add_acceleration(const Surroundings& around, const WindowRows
   chain.A.topLeftCorner<3, 3>() += squares * around.by_position * around.by_position.transpose();
   chain.U -= pull * around.by_border.transpose();
   chain.U.topRows<3>() += squares * around.by_position * around.by_border.transpose();
-  chain.B.selfadjointView<Eigen::Lower>().rankUpdate(around.by_border, squares);
+  chain.add_square(around.by_border, squares);
   chain.a.head<3>() += squares * around.by_position;
   chain.b += squares * around.by_border;
 }
@@ -244,7 +244,8 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
   system.cost += error.dot(information * error);
 }
 
-std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared) const {
+/// None also where it costs more than `most`: then the rest of it is not needed.
+std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared, double most) const {
   SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_solved(), max_at_once_)};
   system.has_given = shared == Shared::all;
   add_given_lens(state, system);
@@ -265,7 +266,7 @@ std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Sh
     add_imu(state, k, system);
     if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_given;
     if (fixed_ && fixed_->frame == k) add_fixed(state, system);
-    if (!system.chain.eliminate()) return std::nullopt;
+    if (!(system.cost <= most) || !system.chain.eliminate()) return std::nullopt;
     for (const std::size_t point : leaving_[k])
       if (!system.chain.leave(point)) return std::nullopt;
   }

@@ -11,13 +11,13 @@ namespace alidade {
 
 /// How the expected pixel changes by what is shared: the lens, then the causes (scale and shape by known positions
 /// alone).
-PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const UsedObservation& observation,
-                                                 const Twist& twist) const {
+PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, std::size_t i, const Twist& twist) const {
+  const UsedObservation& observation = observations_[i];
   const auto num_lens = view.J_px_lens.cols();
   GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
-  for (Eigen::Index i = 0; i < num_lens; ++i) J.col(i) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
-  const SmootherPoint& point = problem_.points[index_of_.at(observation.id)];
-  if (point.given_in_world)  // a target that moves: not where it is given to be, but further by so much
+  for (Eigen::Index k = 0; k < num_lens; ++k) J.col(k) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(k)]);
+  if (problem_.points[point_of_[i]]
+          .given_in_world)  // a target that moves: not where it is given to be, but further by so much
     J.middleCols<3>(num_lens + speed_cause) =
         (problem_.t_s[observation.frame] - mid_s_) * view.J_px_feature.leftCols<3>();
   const double rows =
@@ -27,21 +27,21 @@ PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const
 }
 
 /// None where the camera does not see it.
-std::optional<PathSmoother::ObservationRows> PathSmoother::rows_of(const SmootherState& state,
-                                                                   const UsedObservation& observation,
+std::optional<PathSmoother::ObservationRows> PathSmoother::rows_of(const SmootherState& state, std::size_t i,
                                                                    const Twist& twist, bool has_given) const {
+  const UsedObservation& observation = observations_[i];
   Feature feature;
-  feature.values.head<3>() = state.points[index_of_.at(observation.id)];
+  feature.values.head<3>() = state.points[point_of_[i]];
   const auto view = expected_view(state.camera, state.poses[observation.frame], feature);
   if (!view) return std::nullopt;
   const double weight = 1.0 / observation.sigma_px;
   ObservationRows rows{weight * (view->px - observation.px), weight * view->J_px_pose,
                        weight * view->J_px_feature.leftCols<3>(), GivenRows::Zero(2, num_estimated_)};
   if (has_given)
-    rows.J_shared = weight * given_rows(*view, observation, twist);
+    rows.J_shared = weight * given_rows(*view, i, twist);
   else
-    for (int i = 0; i < num_estimated_; ++i)
-      rows.J_shared.col(i) = weight * view->J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
+    for (int k = 0; k < num_estimated_; ++k)
+      rows.J_shared.col(k) = weight * view->J_px_lens.col(lens_order_[static_cast<std::size_t>(k)]);
   return rows;
 }
 
@@ -52,7 +52,7 @@ bool PathSmoother::look_ahead(const SmootherState& state, std::size_t to, bool h
     of_frame.clear();
     const Twist twist = has_given ? twist_at(state, rows.next) : Twist::Zero();
     for (std::size_t i = first_of_[rows.next]; i < first_of_[rows.next + 1]; ++i) {
-      const auto each = rows_of(state, observations_[i], twist, has_given);
+      const auto each = rows_of(state, i, twist, has_given);
       if (!each) return false;
       of_frame.push_back(*each);
     }
@@ -121,7 +121,7 @@ bool PathSmoother::add_observations(const SmootherState& state, std::size_t k, L
       const Link link = links_.empty() ? Link{} : links_[i];
       const std::size_t added_at = link.before ? observations_[*link.before].frame : frame;
       if (added_at != k) continue;
-      const int at = system.chain.place_of(index_of_.at(observations_[i].id)), row = 6 * static_cast<int>(frame - k);
+      const int at = system.chain.place_of(point_of_[i]), row = 6 * static_cast<int>(frame - k);
       ObservationRows now = rows.of_frame[frame % 3][i - first_of_[frame]];
       now.error *= link.weight;
       now.J_pose *= link.weight;
@@ -156,9 +156,9 @@ void PathSmoother::link_observations(double correlation) {
 
 std::vector<PlacedResidual> PathSmoother::placed_residuals() const {
   std::vector<PlacedResidual> residuals;
-  for (const UsedObservation& observation : observations_) {
-    const auto px =
-        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[index_of_.at(observation.id)]);
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    const UsedObservation& observation = observations_[i];
+    const auto px = project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point_of_[i]]);
     if (!px) continue;
     residuals.push_back(
         {observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px});

@@ -36,8 +36,9 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
 void PathSmoother::find_lives() {
   lives_.assign(problem_.points.size(), std::nullopt);
   first_of_.assign(state_.poses.size() + 1, 0);
-  for (const UsedObservation& observation : observations_) {
-    std::optional<Life>& life = lives_[index_of_.at(observation.id)];
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    const UsedObservation& observation = observations_[i];
+    std::optional<Life>& life = lives_[point_of_[i]];
     if (!life) life = Life{observation.frame, observation.frame};
     life->last = observation.frame;
     ++first_of_[observation.frame + 1];
@@ -100,8 +101,7 @@ bool PathSmoother::settle(double settled) {
     double share = 1.0;
     for (; share > min_share && !next; share *= 0.5) {
       const SmootherState there = moved_by(shared, steps, share);
-      next = build(there, Shared::solved);
-      if (next && !(next->cost <= system->cost + 1e-9 * (1.0 + system->cost))) next.reset();
+      next = build(there, Shared::solved, system->cost + 1e-9 * (1.0 + system->cost));
       if (next) state_ = there;
     }
     if (!next) return gain < 0.1;
@@ -112,6 +112,7 @@ bool PathSmoother::settle(double settled) {
 
 bool PathSmoother::choose_observations() {
   std::vector<UsedObservation> chosen;
+  std::vector<std::size_t> point_of;
   bool is_other = false;
   std::size_t next = 0;
   for (const UsedObservation& observation : problem_.observations) {
@@ -124,9 +125,12 @@ bool PathSmoother::choose_observations() {
     const bool fits = px && (*px - observation.px).squaredNorm() <=
                                 problem_.filter.gate * observation.sigma_px * observation.sigma_px;
     is_other = is_other || fits != was_there;
-    if (fits) chosen.push_back(observation);
+    if (!fits) continue;
+    chosen.push_back(observation);
+    point_of.push_back(point->second);
   }
   observations_ = std::move(chosen);
+  point_of_ = std::move(point_of);
   return is_other;
 }
 
@@ -150,9 +154,11 @@ std::optional<SmoothedPath> PathSmoother::solve() {
   }
   for (const UsedObservation& observation : problem_.observations) {
     const auto point = index_of_.find(observation.id);
-    if (observation.fits_start && point != index_of_.end() &&
-        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]))
-      observations_.push_back(observation);
+    if (!observation.fits_start || point == index_of_.end() ||
+        !project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]))
+      continue;
+    observations_.push_back(observation);
+    point_of_.push_back(point->second);
   }
   if (!settle_all()) return std::nullopt;
   const auto system = build(state_, Shared::all);

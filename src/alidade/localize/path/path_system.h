@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -47,7 +48,8 @@ class PathSmoother {
   static constexpr double well = 1e-3;
   [[nodiscard]] bool settle(double settled = well);
   enum class Shared { solved, all };  ///< What stands in the border: all only for what comes of a solution.
-  [[nodiscard]] std::optional<SmootherSystem> build(const SmootherState& state, Shared shared) const;
+  [[nodiscard]] std::optional<SmootherSystem> build(const SmootherState& state, Shared shared,
+                                                    double most = std::numeric_limits<double>::infinity()) const;
   [[nodiscard]] SmootherState moved_by(const Eigen::VectorXd& shared, const PoseChain::Steps& steps,
                                        double share) const;
   void find_lives();
@@ -56,8 +58,7 @@ class PathSmoother {
   using Twist = Eigen::Vector<double, 6>;  ///< How fast a pose changes: in the world, and on the right. [m/s, rad/s]
   [[nodiscard]] Twist twist_at(const SmootherState& state, std::size_t k) const;
   using GivenRows = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16 + num_causes>;
-  [[nodiscard]] GivenRows given_rows(const ExpectedView& view, const UsedObservation& observation,
-                                     const Twist& twist) const;
+  [[nodiscard]] GivenRows given_rows(const ExpectedView& view, std::size_t i, const Twist& twist) const;
   /// An observation as it is at a state, over its σ.
   struct ObservationRows {
     Eigen::Vector2d error;
@@ -70,8 +71,8 @@ class PathSmoother {
     std::array<std::vector<ObservationRows>, 3> of_frame;
     std::size_t next = 0;
   };
-  [[nodiscard]] std::optional<ObservationRows> rows_of(const SmootherState& state, const UsedObservation& observation,
-                                                       const Twist& twist, bool has_given) const;
+  [[nodiscard]] std::optional<ObservationRows> rows_of(const SmootherState& state, std::size_t i, const Twist& twist,
+                                                       bool has_given) const;
   [[nodiscard]] bool look_ahead(const SmootherState& state, std::size_t to, bool has_given, Lookahead& rows) const;
   void add(const ObservationRows& rows, const ObservationRows* before, double share, int row, int at,
            SmootherSystem& system) const;
@@ -141,7 +142,8 @@ class PathSmoother {
   [[nodiscard]] SmoothedPath finished(const SmootherSystem& system);
 
   const SmootherProblem& problem_;
-  std::vector<UsedObservation> observations_;  ///< Those that fit.
+  std::vector<UsedObservation> observations_;  ///< Those that fit,
+  std::vector<std::size_t> point_of_;          ///< and the index of the point of each.
   std::vector<std::size_t> first_of_;          ///< Of each frame the first of them.
   /// What an observation's error shares with that of the one of the same point before it.
   struct Link {

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "alidade/localize/path/panel_loops.h"
+
 namespace alidade {
 namespace {
 
@@ -35,16 +37,48 @@ int PoseChain::enter(std::size_t point) {
   return place;
 }
 
+void PoseChain::add_square(const Eigen::VectorXd& v, double weight) {
+  take_from_border({});
+  square_ = v;
+  square_weight_ = weight;
+}
+
+/// B − Wᵀ W, and with the square that waits.
+void PoseChain::take_from_border(const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>& W) {
+  using panel_loops::panel;
+  const int num_rows = static_cast<int>(W.rows()), num = num_rows + (square_weight_ != 0.0 ? 1 : 0);
+  if (num == 0) return;
+  const auto place = [num](int i) { return static_cast<std::size_t>(i / panel * num * panel + i % panel); };
+  left_.assign(place((num_used_ + panel - 1) / panel * panel), 0.0);
+  for (int i = 0; i < num_used_; ++i)
+    for (int k = 0; k < num_rows; ++k) left_[place(i) + static_cast<std::size_t>(k * panel)] = W(k, i);
+  if (num == num_rows) {
+    panel_loops::subtract_lower(left_.data(), left_.data(), num, num_used_, B.data(),
+                                static_cast<std::size_t>(B.outerStride()));
+    return;
+  }
+  right_ = left_;
+  for (int i = 0; i < num_used_; ++i) {
+    const std::size_t at = place(i) + static_cast<std::size_t>(num_rows * panel);
+    left_[at] = square_[i];
+    right_[at] = -square_weight_ * square_[i];
+  }
+  square_weight_ = 0.0;
+  panel_loops::subtract_lower(left_.data(), right_.data(), num, num_used_, B.data(),
+                              static_cast<std::size_t>(B.outerStride()));
+}
+
 /// What is left of the equations of those that stay.
 void PoseChain::take_out(const Step& step) {
   A.topLeftCorner<rest_dim, rest_dim>() -= step.W_poses.transpose() * step.W_poses;
   U.topLeftCorner(rest_dim, num_used_).noalias() -= step.W_poses.transpose() * step.W_border;
   a.head<rest_dim>() -= step.W_poses.transpose() * step.y;
-  B.topLeftCorner(num_used_, num_used_).selfadjointView<Eigen::Lower>().rankUpdate(step.W_border.transpose(), -1.0);
+  take_from_border(step.W_border);
   b.head(num_used_).noalias() -= step.W_border.transpose() * step.y;
 }
 
 bool PoseChain::leave(std::size_t point) {
+  take_from_border({});
   const int at = place_of_[point], after = at + 3;
   const Eigen::LLT<Eigen::Matrix3d> llt(B.block<3, 3>(at, at));
   if (llt.info() != Eigen::Success) return false;
@@ -88,14 +122,15 @@ bool PoseChain::eliminate() {
   L.solveInPlace(step.W_border);
   L.solveInPlace(step.y);
   const Eigen::Matrix<double, rest_dim, rest_dim> A_rest = A.bottomRightCorner<rest_dim, rest_dim>();
-  const Eigen::Matrix<double, rest_dim, Eigen::Dynamic> U_rest = U.bottomRows<rest_dim>();
   const Eigen::Vector<double, rest_dim> a_rest = a.tail<rest_dim>();
   A.setZero();
-  U.setZero();
   a.setZero();
   A.topLeftCorner<rest_dim, rest_dim>() = A_rest;
-  U.topRows<rest_dim>() = U_rest;
   a.head<rest_dim>() = a_rest;
+  for (int j = 0; j < num_used_; ++j) {
+    const Eigen::Vector<double, rest_dim> rest = U.col(j).tail<rest_dim>();
+    U.col(j) << rest, Eigen::Vector<double, pose_dim>::Zero();
+  }
   take_out(step);
   steps_.push_back(std::move(step));
   return true;

@@ -27,6 +27,8 @@ class PoseChain {
   Eigen::MatrixXd B;
   Eigen::Vector<double, window> a;
   Eigen::VectorXd b;
+  /// B + weight · v vᵀ, in one pass with what leaves next.
+  void add_square(const Eigen::VectorXd& v, double weight);
 
   /// Where in the border a point stands that enters. Points are counted from none, in any order.
   int enter(std::size_t point);
@@ -78,6 +80,7 @@ class PoseChain {
   };
   struct Backward;
   void take_out(const Step& step);
+  void take_from_border(const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>& W);
   [[nodiscard]] std::vector<Eigen::MatrixXd> forward(const std::vector<Eigen::MatrixXd>& W,
                                                      Eigen::MatrixXd& border) const;
 
@@ -86,6 +89,9 @@ class PoseChain {
   std::vector<int> place_of_;  ///< Of each point.
   std::vector<bool> is_taken_;
   std::vector<Step> steps_;
+  Eigen::VectorXd square_;  ///< That waits,
+  double square_weight_ = 0.0;
+  std::vector<double> left_, right_;  ///< In panels: what is multiplied for B.
 };
 
 }  // namespace alidade

@@ -115,11 +115,9 @@ void LocalizationFilter::append_feature(const NewFeature& made, long id, const S
   if (!P_.grow(dim)) return;
   given_.add(feature.offset, made, config_.lens_params, scale);
   for (int j = 0; j < feature.offset; ++j) {
-    for (int i = 0; i < dim; ++i) {
-      double sum = 0.0;
-      for (int c = 0; c < num_inputs; ++c) sum += J(i, c) * P_.at(place[static_cast<std::size_t>(c)], j);
-      P_.at(feature.offset + i, j) = P_.at(j, feature.offset + i) = sum;
-    }
+    Eigen::Vector<double, 6> sum = Eigen::Vector<double, 6>::Zero();
+    for (int c = 0; c < num_inputs; ++c) sum += P_.at(place[static_cast<std::size_t>(c)], j) * J.col(c);
+    for (int i = 0; i < dim; ++i) P_.at(feature.offset + i, j) = P_.at(j, feature.offset + i) = sum[i];
   }
   for (int i = 0; i < dim; ++i) {
     for (int j = i; j < dim; ++j) {

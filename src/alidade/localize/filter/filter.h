@@ -118,6 +118,17 @@ class LocalizationFilter {
     }
   };
 
+  /// What nobody reads before it is written: a copy has none.
+  template <typename Matrix>
+  struct Scratch : Matrix {
+    Scratch() = default;
+    ~Scratch() = default;
+    Scratch(const Scratch& /*other*/) : Matrix() {}
+    Scratch(Scratch&&) noexcept = default;
+    Scratch& operator=(const Scratch& /*other*/) { return *this = Scratch(); }
+    Scratch& operator=(Scratch&&) noexcept = default;
+  };
+
   [[nodiscard]] const Feature* find(long id) const;
   void remove_numbers(int offset, int count);
   [[nodiscard]] int num_lens() const { return static_cast<int>(config_.lens_params.size()); }
@@ -201,9 +212,9 @@ class LocalizationFilter {
   ScaleReading scale_;           ///< Of the state before the update,
   std::optional<int> scale_at_;  ///< and its component while the update goes on.
   Camera camera_at_delta_;
-  Eigen::MatrixXd joint_x_, joint_s_;
+  Scratch<Eigen::MatrixXd> joint_x_, joint_s_;
   SmallMatrix triangle_;
-  Eigen::VectorXd joint_nu_;
+  Scratch<Eigen::VectorXd> joint_nu_;
   double group_prior_ = 0.0;                      ///< What the last step costs before its group is seen: δᵀP⁻¹δ.
   double group_nis_ = 0.0, group_log_det_ = 0.0;  ///< νᵀS⁻¹ν and ln det S of the group that was solved last,
   double total_nis_ = 0.0, total_log_det_ = 0.0;  ///< and of all that are used.

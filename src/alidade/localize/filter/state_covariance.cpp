@@ -20,18 +20,36 @@ int rounded_up(int count) { return (count + panel - 1) / panel * panel; }
 void StateCovariance::reserve(int state_capacity, int measured_capacity) {
   stride_ = rounded_up(state_capacity);
   pending_capacity_ = rounded_up(measured_capacity);
-  P_.assign(stride() * stride(), 0.0);
-  W_.assign(stride() * static_cast<std::size_t>(pending_capacity_), 0.0);
-  W_aside_ = W_;
+  const std::size_t num_W = stride() * static_cast<std::size_t>(pending_capacity_);
+  P_ = std::make_unique_for_overwrite<double[]>(stride() * stride());
+  W_ = std::make_unique_for_overwrite<double[]>(num_W);
+  W_aside_ = std::make_unique_for_overwrite<double[]>(num_W);
   X_.assign(stride() * max_columns, 0.0);
   shear_.assign(stride() * 3, 0.0);
   HW_.assign(static_cast<std::size_t>(pending_capacity_) * max_columns, 0.0);
   dim_ = pending_ = pending_aside_ = 0;
 }
 
+/// But for what is set aside, which is of an update that is not over.
+StateCovariance& StateCovariance::operator=(const StateCovariance& other) {
+  if (this == &other) return *this;
+  if (stride_ != other.stride_ || pending_capacity_ != other.pending_capacity_)
+    reserve(other.stride_, other.pending_capacity_);
+  dim_ = other.dim_;
+  pending_ = other.pending_;
+  pending_aside_ = 0;
+  const auto padded = static_cast<std::size_t>(num_panels() * panel);
+  for (std::size_t at = 0; at < padded * stride(); at += stride()) std::copy_n(&other.P_[at], padded, &P_[at]);
+  for (int p = 0; p < num_panels(); ++p) {
+    const auto at = static_cast<std::size_t>(p * pending_capacity_ * panel);
+    std::copy_n(&other.W_[at], pending_ * panel, &W_[at]);
+  }
+  return *this;
+}
+
 double StateCovariance::current(int i, int j) const {
   const auto place = [&](int row) {
-    return W_.data() + static_cast<std::size_t>(row / panel * pending_capacity_ * panel + row % panel);
+    return W_.get() + static_cast<std::size_t>(row / panel * pending_capacity_ * panel + row % panel);
   };
   const double *a = place(i), *b = place(j);
   double value = at(i, j);
@@ -41,8 +59,9 @@ double StateCovariance::current(int i, int j) const {
 
 bool StateCovariance::grow(int count) {
   if (dim_ + count > stride_) return false;
-  for (int j = 0; j < dim_ + count; ++j) {
-    for (int i = j < dim_ ? dim_ : 0; i < dim_ + count; ++i) at(i, j) = 0.0;
+  const int padded = rounded_up(dim_ + count);
+  for (int j = 0; j < padded; ++j) {
+    for (int i = j < dim_ ? dim_ : 0; i < padded; ++i) at(i, j) = 0.0;
   }
   dim_ += count;
   return true;
@@ -62,7 +81,7 @@ void StateCovariance::remove(int offset, int count) {
 }
 
 void StateCovariance::product(const Rows& rows, double* x0, double* x1) const {
-  weigh_columns(P_.data(), stride(), rows.columns.data(), static_cast<int>(rows.columns.size()), rows.h0, rows.h1, dim_,
+  weigh_columns(P_.get(), stride(), rows.columns.data(), static_cast<int>(rows.columns.size()), rows.h0, rows.h1, dim_,
                 x0, x1);
 }
 
@@ -88,7 +107,7 @@ void StateCovariance::products(std::span<const Rows> rows) {
   for (int p = 0; p < num_panels(); ++p) {
     double* x = &X_[static_cast<std::size_t>(p * max_columns * panel)];
     for (std::size_t m = 0; m < rows.size(); ++m)
-      weigh_panel(P_.data() + p * panel, stride(), rows[m].columns.data(), static_cast<int>(rows[m].columns.size()),
+      weigh_panel(P_.get() + p * panel, stride(), rows[m].columns.data(), static_cast<int>(rows[m].columns.size()),
                   rows[m].h0, rows[m].h1, x + m * 2 * panel);
     const double* w = &W_[static_cast<std::size_t>(p * pending_capacity_ * panel)];
     for (int tile = 0; tile < tiles; ++tile)

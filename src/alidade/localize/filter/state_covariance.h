@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -8,13 +9,21 @@ namespace alidade {
 
 /// Covariance of a state that grows and shrinks, and the low-rank change that measurements of one moment make to it:
 /// P − W Wᵀ. Measurements add columns to W one after another; commit() takes them all into P in one pass, so that the
-/// large matrix is read and written once a frame. Nothing is allocated after reserve().
+/// large matrix is read and written once a frame. Nothing is allocated after reserve(). What is reserved is not written
+/// before it is needed, and a copy takes what is used alone: most of the room for a large map never is.
 /// P − W Wᵀ with W = P Hᵀ L⁻ᵀ, L Lᵀ = S, is symmetric by construction.
 class StateCovariance {
  public:
   static constexpr int panel = 8;         ///< Rows that are worked on together.
   static constexpr int max_columns = 32;  ///< Of one call of products(): components measured together.
   static constexpr int max_support = 35;  ///< State components that one measurement depends on.
+
+  StateCovariance() = default;
+  ~StateCovariance() = default;
+  StateCovariance(const StateCovariance& other) { *this = other; }
+  StateCovariance(StateCovariance&&) noexcept = default;
+  StateCovariance& operator=(const StateCovariance& other);
+  StateCovariance& operator=(StateCovariance&&) noexcept = default;
 
   /// Room for so many state components, and so many measured ones between two commits.
   void reserve(int state_capacity, int measured_capacity);
@@ -77,9 +86,9 @@ class StateCovariance {
   void mirror_lower();  ///< What stands above the diagonal becomes what stands below.
 
   int dim_ = 0, stride_ = 0, pending_ = 0, pending_aside_ = 0, pending_capacity_ = 0;
-  std::vector<double> P_;            ///< Column by column.
-  std::vector<double> W_, W_aside_;  ///< Panel by panel, in it column by column, 8 rows each.
-  std::vector<double> X_;            ///< The same layout, max_columns.
+  std::unique_ptr<double[]> P_;            ///< Column by column; zero to the end of the last panel.
+  std::unique_ptr<double[]> W_, W_aside_;  ///< Panel by panel, in it column by column, 8 rows each.
+  std::vector<double> X_;                  ///< The same layout, max_columns.
   std::vector<double> HW_;
   std::vector<double> shear_;  ///< What shear() needs: capacity() × 3.
 };

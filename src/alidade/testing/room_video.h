@@ -112,16 +112,31 @@ inline double grey_of(const RoomScene& scene, const Eigen::Vector3d& from, const
   return path;
 }
 
+/// Of each pixel, row by row. Those of the last camera are kept: all images of a film have the same.
+[[nodiscard]] inline const std::vector<std::optional<Eigen::Vector3d>>& room_rays(const Camera& camera) {
+  static Camera last;
+  static std::vector<std::optional<Eigen::Vector3d>> rays;
+  const bool is_last = camera.width_px == last.width_px && camera.height_px == last.height_px &&
+                       model_name(camera.lens) == model_name(last.lens) && params(camera.lens) == params(last.lens);
+  if (is_last && !rays.empty()) return rays;
+  std::vector<Eigen::Vector2d> pixels;
+  for (int v = 0; v < camera.height_px; ++v)
+    for (int u = 0; u < camera.width_px; ++u) pixels.emplace_back(u, v);
+  rays = unproject(camera, pixels);
+  last = camera;
+  return rays;
+}
+
 /// A frame, 8-bit grey: rays cast on the planes of the room, with noise drawn by `seed`.
 [[nodiscard]] inline cv::Mat render_room(const RoomScene& scene, const Rigid3& world_from_cam, std::uint64_t seed) {
   const int width = scene.camera.width_px, height = scene.camera.height_px;
   cv::Mat image(height, width, CV_8U);
   Draws draws(seed);
+  auto ray_in_cam = room_rays(scene.camera).begin();
   for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
-      const auto ray_in_cam = unproject(scene.camera, {u, v});
+    for (int u = 0; u < width; ++u, ++ray_in_cam) {
       const double grey =
-          ray_in_cam ? grey_of(scene, world_from_cam.translation, world_from_cam.rotation * *ray_in_cam) : 0.0;
+          *ray_in_cam ? grey_of(scene, world_from_cam.translation, world_from_cam.rotation * **ray_in_cam) : 0.0;
       image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey + scene.noise * draws.normal());
     }
   }

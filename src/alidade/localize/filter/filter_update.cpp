@@ -78,7 +78,7 @@ bool LocalizationFilter::solve(std::span<Measured*> group) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(measured.num_support); ++k) {
       const int column = measured.columns[k];
       rhs[a] -= h[k] * start_[column];
-      for (int b = 0; b < num; ++b) S(a, b) += h[k] * P_.product_at(column, b);
+      for (int b = 0; b <= a; ++b) S(a, b) += h[k] * P_.product_at(column, b);  // below the diagonal: LLᵀ needs no more
     }
     S(a, a) += measured.variance_px2;
   }

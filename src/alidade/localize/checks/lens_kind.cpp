@@ -164,6 +164,20 @@ bool is_explained(const Localization& result) {
          few * result.num_gated < result.num_used;
 }
 
+/// Whether the lens has no part in it: the path is of all that was seen, and nothing is left that depends on where in
+/// the image it was, as another kind of lens leaves it.
+bool leaves_no_trace(const Localization& result, std::span<const ObservationFrame> frames,
+                     const LocalizationFilterConfig& filter) {
+  constexpr double nearly_all = 0.99;
+  const std::set<std::string_view> traces{"camera", "radial structure", "position in the image"};
+  if (!result.is_smoothed || result.path.size() != frames.size()) return false;
+  if (std::ranges::any_of(result.verdict.checks, [&](const Check& check) {
+        return check.state != State::good && traces.contains(check.name);
+      }))
+    return false;
+  return explained_by(result, frames, filter).share() >= nearly_all;
+}
+
 std::string text_about(const OtherLensKind& other, const Lens& given) {
   const auto name_of = [](const Lens& lens) -> std::string {
     const std::string_view name = model_name(lens);
@@ -188,6 +202,7 @@ std::optional<OtherLensKind> other_lens_kind(std::span<const ObservationFrame> f
   const std::string_view given_kind = model_name(result.camera.lens);
   if (frames.size() < enough || given_kind == "flat_port" || !may_be_of_lens(result.verdict)) return std::nullopt;
   if (std::ranges::none_of(result.path, &PathStep::has_pose) || is_explained(result)) return std::nullopt;
+  if (leaves_no_trace(result, frames, config.filter)) return std::nullopt;
   frames = frames.first(std::min(frames.size(), most));
   const Camera& as_given = result.given_camera ? *result.given_camera : result.camera;
   const Camera given = without_cov(as_given, as_given.lens);

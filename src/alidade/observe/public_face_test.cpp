@@ -163,8 +163,8 @@ TEST(ObserveFace, AnswersWordsThatDoNotFit) {
   config.method = ObserveMethod::flow;
   EXPECT_THAT(fault_of(config), ::testing::HasSubstr("--method flow knows neither --estimate"));
   config = with_words({"bias"});
-  config.rotation = RotationKnowledge::noisy;
-  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("is for --rotation known"));
+  config.rotation = RotationKnowledge::free;
+  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("is for a rotation that is measured"));
 }
 
 TEST(ObserveFace, EveryFieldIsWrittenAsItIsRead) {

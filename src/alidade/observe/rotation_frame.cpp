@@ -1,5 +1,7 @@
 #include "alidade/observe/rotation_frame.h"
 
+#include <algorithm>
+
 #include "alidade/geometry/so3.h"
 #include "alidade/pantilt/head_rotation.h"
 
@@ -99,6 +101,26 @@ void MotionReader::advance_shift(const Eigen::Vector3d& velocity, const Rotation
     shift_m_ = exp_so3(-turn) * shift_m_ - exp_so3(-0.5 * turn) * moved;
   }
   last_velocity_ = velocity;
+}
+
+void take_central_rates(double max_gap_s, std::span<RotationFrame> frames) {
+  constexpr std::size_t reach = 2;
+  const auto mean_rate = [&](std::size_t from, std::size_t until) -> Eigen::Vector3d {
+    const double elapsed_s = frames[until].t_s - frames[from].t_s;
+    if (!(elapsed_s > 0.0)) return Eigen::Vector3d::Zero();
+    const Eigen::Quaterniond turn = frames[until].cam_from_start * frames[from].cam_from_start.conjugate();
+    return -log_so3(turn.normalized()) / elapsed_s;
+  };
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const std::size_t before = k - std::min(k, reach), after = std::min(k + reach, frames.size() - 1);
+    const double elapsed_s = frames[after].t_s - frames[before].t_s;
+    frames[k].rate_rad_per_s.setZero();
+    frames[k].acceleration_rad_per_s2.setZero();
+    if (!(elapsed_s > 0.0) || elapsed_s > 2.0 * max_gap_s) continue;
+    frames[k].rate_rad_per_s = mean_rate(before, after);
+    if (before < k && k < after)
+      frames[k].acceleration_rad_per_s2 = 2.0 * (mean_rate(k, after) - mean_rate(before, k)) / elapsed_s;
+  }
 }
 
 }  // namespace alidade

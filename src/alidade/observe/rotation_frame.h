@@ -59,4 +59,8 @@ class MotionReader {
   Eigen::Quaterniond cam_from_start_ = Eigen::Quaterniond::Identity();
 };
 
+/// Rates and accelerations from the rotations two frames before and after. A difference to the frame's own rotation has
+/// its noise: what is late would seem to explain it. None where such frames are more than twice `max_gap_s` apart.
+void take_central_rates(double max_gap_s, std::span<RotationFrame> frames);
+
 }  // namespace alidade

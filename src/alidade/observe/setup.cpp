@@ -154,8 +154,8 @@ void check_rotation_words(const ObserveSetup& setup, const RotationLog& log) {
     ObserveSetup one = setup;
     one.estimate_errors = rotation_causes_of(word);
     if (one.estimate_errors.empty()) continue;
-    if (setup.rotation != RotationKnowledge::known) {
-      throw ConfigError("--estimate " + word + ": is for --rotation known");
+    if (setup.rotation == RotationKnowledge::free) {
+      throw ConfigError("--estimate " + word + ": is for a rotation that is measured");
     }
     if (!estimated_errors(log, one).empty()) continue;
     one.sigma_scale = 1.0;

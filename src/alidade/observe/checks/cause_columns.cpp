@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "alidade/geometry/so3.h"
+#include "alidade/observe/checks/eliminated_rotations.h"
 
 namespace alidade {
 namespace {
@@ -50,11 +51,12 @@ CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, 
         std::min(static_cast<std::size_t>(row - log.rows.begin()), std::max<std::size_t>(log.rows.size(), 1) - 1));
   }
   add_lens();
-  if (!config.nuisances.mount) {
+  const bool is_measured = log.source != RotationSource::none;
+  if (!config.nuisances.mount && is_measured) {
     first_mount_ = size();
     for (const char* member : {"about x", "about y", "about z"}) add("mount", member, usual_mount_rad, "rad");
   }
-  if (!config.nuisances.delay) {
+  if (!config.nuisances.delay && is_measured) {
     first_delay_ = size();
     add("delay", "delay", usual_delay_s, "s");
   }
@@ -65,7 +67,7 @@ CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, 
   if (!config.nuisances.drift) drift_ = size();
   if (drift_ >= 0) add("focal length that drifts", "f'/f", usual_zoom_per_s, "1/s");
   add_zoom();
-  if (!config.nuisances.lever && log.source != RotationSource::none) add_lever();
+  if (!config.nuisances.lever) add_lever();
   first_pattern_ = size();
   for (const TurnPattern& pattern : patterns_) {
     add(pattern.error.cause, pattern.error.member, pattern.error.ordinary, pattern.error.unit);
@@ -136,7 +138,7 @@ void CauseColumns::add_lever() {
 
 void CauseColumns::begin_frame(int frame) {
   frame_ = frame;
-  const RotationFrame& now = reference_.bundle.frames[static_cast<std::size_t>(frame)];
+  const RotationFrame now = rotated_frame(reference_, frame);
   frame_time_s_ = now.t_s;
   const RotatingCamera& camera = reference_.solution.camera;
   view_.emplace(camera, now);
@@ -167,7 +169,7 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
   by_causes.setZero();
   const Eigen::Vector3d in_cam = view_->point_in_cam(bearing);
   fill_lens(in_cam, by_causes);
-  const Eigen::Matrix<double, 2, 3> by_rotation = wide.J_px_common.middleCols<3>(wide_.rotation);
+  const Eigen::Matrix<double, 2, 3> by_rotation = this->by_rotation();
   if (first_mount_ >= 0) by_causes.middleCols<3>(first_mount_) = wide.J_px_common.middleCols<3>(wide_.mount);
   if (first_delay_ >= 0) by_causes.col(first_delay_) = wide.J_px_common.col(wide_.delay);
   if (shutter_ >= 0) by_causes.col(shutter_) = wide.J_px_common.col(wide_.delay) * (seen.px.y() / height_);

@@ -26,6 +26,10 @@ class CauseColumns {
   void begin_frame(int frame);
   /// Of the observation: the pixel as predicted, J by the estimated parameters, by the point, by the causes.
   [[nodiscard]] bool at(const BundleObservation& seen, RotationPrediction& p, Eigen::Ref<Eigen::MatrixXd> by_causes);
+  /// Of the observation that was asked for last, J by its frame's rotation.
+  [[nodiscard]] Eigen::Matrix<double, 2, 3> by_rotation() const {
+    return wide_prediction_.J_px_common.middleCols<3>(wide_.rotation);
+  }
 
  private:
   void add(const std::string& group, const std::string& member, double ordinary, const std::string& unit = "");

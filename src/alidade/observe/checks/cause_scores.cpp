@@ -7,6 +7,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/observe/checks/cause_columns.h"
+#include "alidade/observe/checks/eliminated_rotations.h"
 #include "alidade/observe/checks/stated_covariance.h"
 
 namespace alidade {
@@ -75,9 +76,12 @@ class Linearisation {
   Linearisation(const RotationLog& log, const Adjustment& reference, const CauseConfig& config)
       : reference_(reference), columns_(log, reference, config), n_(columns_.layout().size), q_(columns_.size()) {
     const std::size_t count = reference.bundle.observations.size();
-    every_ = static_cast<int>((count + max_observations - 1) / max_observations);
-    eliminate_points();
+    const bool is_rotated = has_rotations(reference.solution);  // of few frames
+    if (!is_rotated) every_ = static_cast<int>((count + max_observations - 1) / max_observations);
+    is_rotated ? eliminate_rotations() : eliminate_points();
     gather();
+    if (is_rotated) leave_out_absorbed();
+    inverse_nn_ = inverse_symmetric(all_.information.topLeftCorner(n_, n_));
   }
 
   std::vector<CauseScore> scores() const {
@@ -111,25 +115,67 @@ class Linearisation {
     }
   }
 
+  [[nodiscard]] MatrixXd columns_of(const MatrixXd& by_causes) const {
+    MatrixXd J(2, n_ + q_);
+    J << prediction_.J_px_common.leftCols(n_), by_causes;
+    return J;
+  }
+
+  void eliminate_rotations() {
+    rotations_.emplace(reference_, n_ + q_);
+    visit([&](std::size_t i, const BundleObservation& seen, const MatrixXd& by_causes) {
+      rotations_->add(seen, residual_weight(reference_, i), columns_of(by_causes), columns_.by_rotation(),
+                      prediction_.J_px_point);
+    });
+    rotations_->solve();
+  }
+
+  /// Derivatives by estimated parameters and causes, with all else following.
+  [[nodiscard]] MatrixXd followed(const BundleObservation& seen, const MatrixXd& by_causes) const {
+    MatrixXd J = columns_of(by_causes);
+    if (rotations_) return rotations_->followed(seen, J, columns_.by_rotation(), prediction_.J_px_point);
+    const auto point = static_cast<std::size_t>(seen.point);
+    J.leftCols(n_) += prediction_.J_px_point * reference_.solution.given_common[point].slope;
+    J.rightCols(q_) += prediction_.J_px_point * by_point_[point];
+    return J;
+  }
+
+  [[nodiscard]] Block& block_of(int frame) {
+    const auto& frames = reference_.bundle.frames;
+    const double from_s = frames.front().t_s, block_s = (frames.back().t_s - from_s) / num_blocks;
+    const double elapsed_s = frames[static_cast<std::size_t>(frame)].t_s - from_s;
+    return blocks_[static_cast<std::size_t>(std::clamp(static_cast<int>(elapsed_s / block_s), 0, num_blocks - 1))];
+  }
+
+  /// A mount, a late clock: where rotations are not measured they are nothing.
+  void leave_out_absorbed() {
+    for (Index i = n_; i < n_ + q_; ++i) {
+      if (!rotations_->is_absorbed(i, all_.information(i, i))) continue;
+      const auto leave_out = [i](Block& block) {
+        block.gradient[i] = 0.0;
+        block.information.row(i).setZero();
+        block.information.col(i).setZero();
+      };
+      for (Block& block : blocks_) leave_out(block);
+      leave_out(all_);
+    }
+  }
+
   void gather() {
     const Index size = n_ + q_;
     blocks_.assign(num_blocks, {VectorXd::Zero(size), MatrixXd::Zero(size, size)});
     const auto& frames = reference_.bundle.frames;
-    const double from_s = frames.front().t_s, block_s = (frames.back().t_s - from_s) / num_blocks;
+    const double block_s = (frames.back().t_s - frames.front().t_s) / num_blocks;
     seen_ = seen_within(block_s, lasting_errors(reference_).seconds);
-    MatrixXd J(2, size);
     visit([&](std::size_t i, const BundleObservation& seen, const MatrixXd& by_causes) {
-      const auto point = static_cast<std::size_t>(seen.point);
-      J.leftCols(n_) =
-          prediction_.J_px_common.leftCols(n_) + prediction_.J_px_point * reference_.solution.given_common[point].slope;
-      J.rightCols(q_) = by_causes + prediction_.J_px_point * by_point_[point];
-      const double elapsed_s = frames[static_cast<std::size_t>(seen.frame)].t_s - from_s;
-      Block& block =
-          blocks_[static_cast<std::size_t>(std::clamp(static_cast<int>(elapsed_s / block_s), 0, num_blocks - 1))];
+      const MatrixXd J = followed(seen, by_causes);
+      Block& block = block_of(seen.frame);
       const double weight = residual_weight(reference_, i);
       block.gradient.noalias() += weight * J.transpose() * (prediction_.px - seen.px);
       block.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), weight);
     });
+    for (int k = 0; rotations_ && k < static_cast<int>(frames.size()); ++k)
+      rotations_->add_prior(k, block_of(k).gradient, block_of(k).information);
     all_ = {VectorXd::Zero(size), MatrixXd::Zero(size, size)};
     for (Block& block : blocks_) {
       block.information = MatrixXd(block.information.selfadjointView<Eigen::Lower>());
@@ -138,7 +184,6 @@ class Linearisation {
     }
     all_.information.topLeftCorner(n_, n_) += reference_.solution.prior_information / every_;
     all_.gradient.head(n_) += reference_.solution.prior_gradient / every_;
-    inverse_nn_ = inverse_symmetric(all_.information.topLeftCorner(n_, n_));
   }
 
   [[nodiscard]] double design_effect(const ReducedCause& cause, const VectorXd& step) const;
@@ -150,8 +195,9 @@ class Linearisation {
   CauseColumns columns_;
   Index n_, q_;
   int every_ = 1;
-  double seen_ = 1.0;               ///< Of the variance of sums, within blocks.
-  std::vector<MatrixXd> by_point_;  ///< How each point follows the causes.
+  double seen_ = 1.0;                             ///< Of the variance of sums, within blocks.
+  std::vector<MatrixXd> by_point_;                ///< How each point follows the causes; where rotations are estimated,
+  std::optional<EliminatedRotations> rotations_;  ///< these and the points.
   std::vector<Block> blocks_;
   Block all_;
   MatrixXd inverse_nn_;
@@ -209,7 +255,6 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
 std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& reference, const CauseConfig& config) {
   const RotationBundle& bundle = reference.bundle;
   if (bundle.frames.size() < 2 || bundle.frames.back().t_s <= bundle.frames.front().t_s) return {};
-  if (reference.solution.given_common.size() != bundle.points.size()) return {};
   return Linearisation(log, reference, config).scores();
 }
 

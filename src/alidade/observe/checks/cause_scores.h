@@ -37,8 +37,8 @@ struct CauseConfig {
 /// share errors in time χ² is divided by their design effect in the cause's own directions, taken after its step:
 /// a cause does not hide behind the scatter that it makes. Tested: k1, k2, k3, p1 and p2, the lens whole; mount, delay,
 /// line time of a rolling shutter, lever arm (one parallax for all points, and each point's own along the view), a
-/// focal length that drifts, and the patterns of the log's rotation. Not for bundles with free rotations.
-/// Rao 1948; docs/maths/rotating-camera.md.
+/// focal length that drifts, and the patterns of the log's rotation. Rotations that are estimated are eliminated
+/// with the points. Rao 1948; docs/maths/rotating-camera.md.
 [[nodiscard]] std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& reference,
                                                    const CauseConfig& config);
 

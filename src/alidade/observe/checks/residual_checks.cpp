@@ -215,7 +215,7 @@ std::vector<Check> residual_checks(const ObserveSolution& report) {
     checks.push_back(lasting_check(report));
   }
   checks.push_back(noise_check(report));
-  if (!report.causes.empty()) checks.push_back(jitter_check(report));
+  if (report.jitter.f_ratio > 0.0) checks.push_back(jitter_check(report));
   checks.push_back(rejected_check(report));
   if (!report.reference.bundle_point_of.empty() && !report.causes.empty()) checks.push_back(points_check(report));
   if (report.from_reference > 0.0) checks.push_back(reference_check(report));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/observe/checks/eliminated_rotations.h"
 
 namespace alidade {
 namespace {
@@ -53,35 +54,91 @@ void add_lasting(const MatrixXd& half, double now_s, const LastingErrors& errors
   before.of_block += half;
 }
 
+/// Each observation of a reference with its derivatives by the shared parameters, all else following.
+class Derivatives {
+ public:
+  Derivatives(const Adjustment& reference, const ObserveNuisances& nuisances)
+      : reference_(reference), layout_(with_rotation(nuisances, false)), wide_(with_rotation(nuisances, true)) {
+    if (!has_rotations(reference.solution)) return;
+    rotations_.emplace(reference, size());
+    for (std::size_t i = 0; i < reference.bundle.observations.size(); ++i) {
+      if (predict(i))
+        rotations_->add(reference.bundle.observations[i], residual_weight(reference, i),
+                        p_.J_px_common.leftCols(size()), p_.J_px_common.middleCols<3>(wide_.rotation), p_.J_px_point);
+    }
+    rotations_->solve();
+  }
+
+  [[nodiscard]] Eigen::Index size() const { return layout_.size; }
+  [[nodiscard]] const std::optional<EliminatedRotations>& rotations() const { return rotations_; }
+  /// J and the prediction minus the pixel. False: it has no pixel.
+  bool at(std::size_t i, MatrixXd& J, Eigen::Vector2d& error) {
+    if (!predict(i)) return false;
+    const BundleObservation& seen = reference_.bundle.observations[i];
+    error = p_.px - seen.px;
+    J = p_.J_px_common.leftCols(size());
+    if (rotations_)
+      J = rotations_->followed(seen, J, p_.J_px_common.middleCols<3>(wide_.rotation), p_.J_px_point);
+    else
+      J += p_.J_px_point * reference_.solution.given_common[static_cast<std::size_t>(seen.point)].slope;
+    return true;
+  }
+
+ private:
+  static ObserveNuisances with_rotation(ObserveNuisances nuisances, bool has_it) {
+    nuisances.rotation = has_it;
+    return nuisances;
+  }
+  bool predict(std::size_t i) {
+    const BundleObservation& seen = reference_.bundle.observations[i];
+    if (seen.frame != frame_) view_.emplace(reference_.solution.camera, rotated_frame(reference_, frame_ = seen.frame));
+    return view_->predict(reference_.solution.points[static_cast<std::size_t>(seen.point)],
+                          has_rotations(reference_.solution) ? wide_ : layout_, p_);
+  }
+
+  const Adjustment& reference_;
+  CommonLayout layout_, wide_;
+  std::optional<EliminatedRotations> rotations_;
+  std::optional<RotationView> view_;
+  RotationPrediction p_;
+  int frame_ = -1;
+};
+
+/// What is known of the rotations counts as one more measurement each.
+void add_rotations(const EliminatedRotations& rotations, const std::vector<int>& block_of_frame, Parts& parts) {
+  for (std::size_t k = 0; k < block_of_frame.size(); ++k) {
+    Part& block = parts.blocks[static_cast<std::size_t>(block_of_frame[k])];
+    MatrixXd information = MatrixXd::Zero(parts.lasting.rows(), parts.lasting.cols());
+    rotations.add_prior(static_cast<int>(k), block.gradient, information);
+    block.information += information;
+    parts.lasting += information;
+  }
+}
+
 Parts parts_of(const Adjustment& reference, const ObserveNuisances& nuisances, int num_blocks,
                const LastingErrors& errors) {
   const RotationBundle& bundle = reference.bundle;
-  ObserveNuisances without_rotation = nuisances;
-  without_rotation.rotation = false;
-  const CommonLayout layout(without_rotation);
-  const Eigen::Index n = layout.size;
+  Derivatives derivatives(reference, nuisances);
+  const Eigen::Index n = derivatives.size();
   Parts parts{std::vector<Part>(static_cast<std::size_t>(num_blocks), Part(n)),
               std::vector<Part>(bundle.points.size(), Part(n)), MatrixXd::Zero(n, n)};
   std::vector<Memory> memory(bundle.points.size(), {MatrixXd::Zero(n, 2), MatrixXd::Zero(n, 2)});
   const double from_s = bundle.frames.front().t_s, block_s = duration_of(reference) / num_blocks;
-  int frame = -1, block = 0;
-  std::optional<RotationView> view;
-  RotationPrediction p;
+  std::vector<int> block_of_frame;
+  for (const RotationFrame& frame : bundle.frames)
+    block_of_frame.push_back(std::clamp(static_cast<int>((frame.t_s - from_s) / block_s), 0, num_blocks - 1));
+  int block = 0;
+  MatrixXd J;
+  Eigen::Vector2d error;
   for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
     const BundleObservation& seen = bundle.observations[i];
-    if (seen.frame != frame) {
-      const RotationFrame& now = bundle.frames[static_cast<std::size_t>(frame = seen.frame)];
-      view.emplace(reference.solution.camera, now);
-      const int next = std::clamp(static_cast<int>((now.t_s - from_s) / block_s), 0, num_blocks - 1);
-      for (std::size_t k = 0; next != block && k < memory.size(); ++k) memory[k].of_block.setZero();
-      block = next;
-    }
-    const auto point = static_cast<std::size_t>(seen.point);
-    if (!view->predict(reference.solution.points[point], layout, p)) continue;
-    const PointGivenCommon& given = reference.solution.given_common[point];
-    const PixelByCommon J = p.J_px_common.leftCols(n) + p.J_px_point * given.slope;
+    const auto frame = static_cast<std::size_t>(seen.frame), point = static_cast<std::size_t>(seen.point);
+    const int next = block_of_frame[frame];
+    for (std::size_t k = 0; next != block && k < memory.size(); ++k) memory[k].of_block.setZero();
+    block = next;
+    if (!derivatives.at(i, J, error)) continue;
     const double weight = residual_weight(reference, i);
-    const VectorXd gradient = weight * J.transpose() * (p.px - seen.px);
+    const VectorXd gradient = weight * J.transpose() * error;
     const MatrixXd half = reference.sigma_px * weight * J.transpose();
     const MatrixXd information = weight * J.transpose() * J;
     Part& in_block = parts.blocks[static_cast<std::size_t>(block)];
@@ -89,9 +146,10 @@ Parts parts_of(const Adjustment& reference, const ObserveNuisances& nuisances, i
     in_block.information += information;
     parts.tracks[point].gradient += gradient;
     parts.lasting += information;
-    const double now_s = bundle.frames[static_cast<std::size_t>(frame)].t_s;
-    if (errors.share > 0.0) add_lasting(half, now_s, errors, memory[point], parts.lasting, in_block.information);
+    if (errors.share > 0.0)
+      add_lasting(half, bundle.frames[frame].t_s, errors, memory[point], parts.lasting, in_block.information);
   }
+  if (derivatives.rotations()) add_rotations(*derivatives.rotations(), block_of_frame, parts);
   return parts;
 }
 
@@ -215,8 +273,7 @@ StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNui
   stated.cov = model;
   stated.inflation = VectorXd::Ones(model.rows());
   const double duration_s = duration_of(reference);
-  const bool has_turns = reference.solution.given_common.size() != reference.bundle.points.size();
-  if (has_turns || !model.allFinite() || !(duration_s > 0.0)) return stated;
+  if (!model.allFinite() || !(duration_s > 0.0)) return stated;
   stated.lasting = model;
   const LastingErrors errors = lasting_errors(reference);
   stated.correlation_s = errors.seconds;

@@ -20,8 +20,8 @@ struct StatedCovariance {
 /// Cluster-robust covariance both ways, in time and along tracks. What lasts along the tracks is counted
 /// by its correlation, which all tracks together determine well (Newey & West 1987, with an exponential kernel that is
 /// fitted); blocks of time, as long as five times that correlation where at least six fit, add what scatters beyond it.
-/// Tracks count where their scatter is beyond chance (three of its σ): a few of them say little. Not for bundles with
-/// turns: the model's covariance comes back. Cameron, Gelbach & Miller, J. Bus. Econ. Stat. 29(2), 2011.
+/// Tracks count where their scatter is beyond chance (three of its σ): a few of them say little. Cameron, Gelbach &
+/// Miller, J. Bus. Econ. Stat. 29(2), 2011.
 [[nodiscard]] StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNuisances& nuisances);
 
 /// What lasts in the residuals along the tracks, for a correlation c exp(−t/τ): c is the share of the noise that lasts,

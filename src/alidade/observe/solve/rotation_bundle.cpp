@@ -343,6 +343,9 @@ class Solver {
       reduced.topLeftCorner(n, n).noalias() -= by_common.transpose() * Ldlt(turns).solve_each(by_common);
     }
     solution.information = reduced.topLeftCorner(n, n);
+    if (num_rotations_ > 0) solution.rotation_errors = state_.rotation_errors;
+    solution.rotations_walk = is_random_walk();
+    for (int k = 0; k < num_rotations_; ++k) solution.rotation_information.push_back(rotation_information(k));
     for (std::size_t i = 0; i < blocks_.size() && num_rotations_ == 0; ++i) {
       solution.given_common.push_back({-inverse_[i] * blocks_[i].by_common, inverse_[i]});
     }

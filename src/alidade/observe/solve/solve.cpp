@@ -290,6 +290,8 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   if (is_judged && is_gross(report)) misread = misread_rotation(log, config, report, progress);
   if (config.estimate_auto && is_judged && !misread.explains_all) {
     find_causes(log, given, progress, config, report, rivals);
+  } else if (config.estimate_auto && !is_known) {
+    free_one_by_one(log, progress, config, report, rivals);
   }
   prefer_all_rows(log, config, progress, report);
   if (is_judged && !config.no_zoom && !misread.explains_all && never_rests(log, config, report, progress)) {

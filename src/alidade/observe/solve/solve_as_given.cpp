@@ -43,8 +43,8 @@ std::vector<RotationError> estimated_errors(const RotationLog& log, const Observ
 /// Errors of the rotation are small, and yet not linear (a play opens at each turning point): the log is freed of what
 /// was found, and asked again.
 ObserveSolution solve_as_given(const RotationLog& log, const ObserveSetup& config, const Progress& progress) {
-  const bool is_known = config.rotation == RotationKnowledge::known;
-  const std::vector<RotationError> errors = is_known ? estimated_errors(log, config) : std::vector<RotationError>{};
+  const bool is_measured = config.rotation != RotationKnowledge::free;
+  const std::vector<RotationError> errors = is_measured ? estimated_errors(log, config) : std::vector<RotationError>{};
   RotationErrors undone = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
   ObserveSolution report = solve_once(log, config, errors, undone, progress);
   constexpr int max_rounds = 4;

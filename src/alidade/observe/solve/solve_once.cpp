@@ -80,6 +80,8 @@ class Observation {
       report_.rows_used += is_used ? 1 : 0;
     }
     if (log_.source == RotationSource::none) begin_free();
+    if (config_.rotation != RotationKnowledge::known && log_.source != RotationSource::rate)
+      take_central_rates(config_.max_gap_s, frames_);
     if (log_.source != RotationSource::none && config_.nuisances.mount)
       start_.cam_from_mount = exp_so3({0.0, 0.0, start_roll(frames_)});
     add_turns(log_, errors_, config_.max_gap_s, frames_);
@@ -257,13 +259,11 @@ class Observation {
     report_.reference = adjust(buffer, config, progress_);
     if (!report_.reference.has_value) return;
     report_.pixels_rejected = report_.reference.num_rejected;
-    if (config_.rotation == RotationKnowledge::known) {
-      report_.jitter = rotation_jitter(report_.reference);
-      report_.stated = stated_covariance(report_.reference, config.nuisances);
-      report_.causes = cause_scores(
-          log_, report_.reference,
-          {config.nuisances, config_.max_gap_s, report_.height_px / report_.scale.scale, config_.estimate_errors});
-    }
+    if (config_.rotation == RotationKnowledge::known) report_.jitter = rotation_jitter(report_.reference);
+    report_.stated = stated_covariance(report_.reference, config.nuisances);
+    report_.causes = cause_scores(
+        log_, report_.reference,
+        {config.nuisances, config_.max_gap_s, report_.height_px / report_.scale.scale, config_.estimate_errors});
     if (config_.method != ObserveMethod::batch && config_.rotation == RotationKnowledge::known) return;
     IntrinsicsEstimate all;
     fill(all, report_.reference, frames_.back().t_s);
@@ -321,14 +321,13 @@ class Observation {
 
   /// What the reference says of the errors that pixels share, and what is given with a σ, on top of the model's.
   void state_covariance(const CommonLayout& layout) {
-    const bool is_known = config_.rotation == RotationKnowledge::known;
     const Eigen::VectorXd& inflation = report_.stated.inflation;
-    if (is_known && inflation.size() >= layout.size) {
+    if (inflation.size() >= layout.size) {
       const CommonVector raise = inflation.head(layout.size);
       final_cov_ =
           CommonMatrix(raise.asDiagonal() * final_cov_.topLeftCorner(layout.size, layout.size) * raise.asDiagonal());
     }
-    if (is_known) compare_with_reference();
+    if (config_.rotation == RotationKnowledge::known) compare_with_reference();
     report_.assumed = taken_as_given(log_, config_, report_, final_cov_);
   }
 

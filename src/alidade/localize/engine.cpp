@@ -27,6 +27,14 @@ void LocalizeEngine::begin(std::span<const StartHypothesis> starts, double t_s, 
   t_s_ = t_s;
 }
 
+/// Frame and scale are the known points' where nothing else is given of either, and where all of them stay.
+ObservationsReport LocalizeEngine::update(std::span<const FeatureObservation> observations) {
+  const ObservationsReport report = bank_->update(observations);
+  if (!config_.start && !config_.depth_m && !config_.map && config_.target.points.size() <= max_known_at_once)
+    bank_->fit_frame();
+  return report;
+}
+
 void LocalizeEngine::predict_to(double t_s, double period_s) {
   constexpr int max_steps = 1000;  // σ is as large as the world long before
   const double gap_s = t_s - t_s_;

@@ -14,6 +14,8 @@ namespace alidade {
 
 /// A pose has six components, a point two.
 inline constexpr std::size_t min_observations = 3;
+/// Known points, of three components each: the others need their part of the state.
+inline constexpr std::size_t max_known_at_once = 100;
 
 /// The estimator behind localize(): the filters, and the state kept from frame to frame. Two front ends drive it, one
 /// for given observations, one that makes them from images.
@@ -34,6 +36,8 @@ class LocalizeEngine {
   [[nodiscard]] KnownPoseConfig pose_config() const;
   void begin(std::span<const StartHypothesis> starts, double t_s, const FilterBankConfig& bank);
   void end() { bank_.reset(); }
+  /// With the observations of a frame.
+  ObservationsReport update(std::span<const FeatureObservation> observations);
   /// In steps of a frame's period: accelerations are drawn again for each, also while frames are missing.
   void predict_to(double t_s, double period_s);
   /// Pose, and what became of the observations; of them the target's, where the filter says so.

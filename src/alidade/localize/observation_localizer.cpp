@@ -9,12 +9,6 @@
 #include "alidade/localize/path/path_resection.h"
 
 namespace alidade {
-namespace {
-
-constexpr std::size_t max_known_at_once = 100;  // three components each: the others need their part of the state
-
-}  // namespace
-
 double ObservationLocalizer::period_s() const { return config_.period_s > 0.0 ? config_.period_s : gap_.s(); }
 
 void ObservationLocalizer::keep_gap(double t_s) {
@@ -356,7 +350,7 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
   }
   std::optional<OtherPlace> other;
   if (config_.restarts && step.event == FrameEvent::tracked) other = other_place(frame);
-  const ObservationsReport report = engine_.filters().update(frame.observations);
+  const ObservationsReport report = engine_.update(frame.observations);
   engine_.fill(frame.observations, report, step);
   engine_.keep_residuals(frame.observations, report);
   if (config_.restarts && step.event == FrameEvent::tracked && !other) other = other_place(frame);
@@ -364,7 +358,7 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
   const Doubt doubt = engine_.doubt_after(step);
   drop_strangers(frame, report);
   if (config_.restarts && ((other && find_again(std::move(*other), frame, report)) || restart(frame, doubt))) {
-    const ObservationsReport again = engine_.filters().update(frame.observations);
+    const ObservationsReport again = engine_.update(frame.observations);
     engine_.fill(frame.observations, again, step);
     step.event = FrameEvent::restarted;
   }

@@ -10,8 +10,8 @@
 
 #include "alidade/estimation/config_error.h"
 #include "alidade/localize/filter/filter.h"
-#include "alidade/localize/filter/known_map.h"
 #include "alidade/localize/frames/image_localizer.h"
+#include "alidade/localize/frames/known_map.h"
 
 namespace alidade {
 namespace {

@@ -22,6 +22,10 @@ struct Feature {
   Eigen::Vector<double, 6> values = Eigen::Vector<double, 6>::Zero();  ///< The first 3 of xyz.
   bool is_known = false;  ///< One of the target's, which give scale and frame.
   int offset = 0;         ///< Where its components begin in the state.
+  /// Of a known point: as it was given, and whether any of its observations was used.
+  Eigen::Vector3d given_in_world = Eigen::Vector3d::Zero();
+  double sigma_given_m = 0.0;
+  bool was_used = false;
 
   [[nodiscard]] int dim() const { return kind == FeatureKind::xyz ? 3 : 6; }
 };

@@ -74,6 +74,8 @@ bool LocalizationFilter::add_known(long id, const Eigen::Vector3d& point_in_worl
   feature.id = id;
   feature.values.head<3>() = point_in_world;
   feature.is_known = true;
+  feature.given_in_world = point_in_world;
+  feature.sigma_given_m = sigma_m;
   feature.offset = P_.dim();
   if (!P_.grow(3)) return false;
   for (int i = 0; i < 3; ++i) P_.at(feature.offset + i, feature.offset + i) = sigma_m * sigma_m;

@@ -8,6 +8,7 @@
 
 #include "alidade/localize/config.h"
 #include "alidade/localize/filter/feature.h"
+#include "alidade/localize/filter/fitted_frame.h"
 #include "alidade/localize/filter/given_effects.h"
 #include "alidade/localize/filter/state_covariance.h"
 #include "alidade/localize/filter/world_scale.h"
@@ -62,6 +63,9 @@ class LocalizationFilter {
   /// there already, or the lens sees nothing there.
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
   void remove(long id);
+  /// Frame and scale of the state become those of its known points as they were given: fitted_frame.h. For a world of
+  /// which nothing but these points says where and how large it is.
+  void fit_frame();
   /// Whether so many more components fit into the state.
   [[nodiscard]] bool has_room(int count) const { return P_.dim() + count <= config_.state_capacity; }
   /// Inverse depths that are nearly linear become positions: half the components. Their count.
@@ -174,6 +178,8 @@ class LocalizationFilter {
   [[nodiscard]] bool use_again();
   [[nodiscard]] bool finish_update();
   void drop_update();  ///< The state stays where it was.
+  void note_used();
+  void transform(const FittedFrame& frame);
   /// The state goes where delta_ says, and the covariance's errors are counted from there.
   void turn_by_delta();
   void move_by_delta();

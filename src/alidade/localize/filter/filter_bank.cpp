@@ -100,6 +100,10 @@ int FilterBank::convert_linear() {
   return num_converted;
 }
 
+void FilterBank::fit_frame() {
+  for (Part& part : parts_) part.filter.fit_frame();
+}
+
 void FilterBank::restart(std::span<const StartHypothesis> starts) {
   const LocalizationFilter map = best();
   parts_.clear();

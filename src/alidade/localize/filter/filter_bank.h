@@ -32,6 +32,7 @@ class FilterBank {
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
   void remove(long id);
   int convert_linear();
+  void fit_frame();
   /// Starts again from these, with the map as it is.
   void restart(std::span<const StartHypothesis> starts);
 

@@ -284,6 +284,7 @@ bool LocalizationFilter::finish_update() {
     return false;
   }
   P_.commit();
+  note_used();
   if (scale_at_) count_scale();
   end_scale();
   turns_world_ ? turn_by_delta() : move_by_delta();

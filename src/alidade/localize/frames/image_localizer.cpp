@@ -92,7 +92,7 @@ void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen)
   for (const KnownPoint& point : given_) engine_.filters().add_known(point.id, point.point_in_world, point.sigma_m);
   std::vector<FeatureObservation> observations = seen.observations;
   for (FeatureObservation& observation : observations) observation.sigma_px = config_.features.sigma_floor_px;
-  const ObservationsReport report = engine_.filters().update(observations);
+  const ObservationsReport report = engine_.update(observations);
   num_found_now_ = report.num_used;
   now_ = observations;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // of the plane through the points
@@ -258,7 +258,7 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
   enter_saved();
   const std::vector<FeatureObservation> observations = look(smoothed, {0.85, 0.0});
   if (!is_found(observations.size())) return false;
-  const ObservationsReport report = engine_.filters().update(observations);
+  const ObservationsReport report = engine_.update(observations);
   constexpr double max_nis = 3.0;
   if (!report.is_sound || !is_found(report.num_used) || report.nis_per_dof > max_nis) return false;
   PathStep found = step;
@@ -321,7 +321,7 @@ void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
   step.num_seen = observations.size();
   step.event = FrameEvent::predicted;
   if (is_found(observations.size())) {
-    const ObservationsReport report = engine_.filters().update(observations);
+    const ObservationsReport report = engine_.update(observations);
     engine_.fill(observations, report, step);
     now_ = observations;
     count(observations, report);

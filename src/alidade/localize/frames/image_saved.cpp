@@ -3,8 +3,8 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/estimation/median.h"
-#include "alidade/localize/filter/known_map.h"
 #include "alidade/localize/frames/image_localizer.h"
+#include "alidade/localize/frames/known_map.h"
 
 // The map of an earlier run: the path begins in it, and its points come into the filter where they should be seen.
 

@@ -1,4 +1,4 @@
-#include "alidade/localize/filter/known_map.h"
+#include "alidade/localize/frames/known_map.h"
 
 #include <algorithm>
 #include <cmath>

@@ -327,7 +327,8 @@ void add_localize(App& app) {
           "sequence", args->sequence,
           "Images: a folder of numbered ones, EuRoC's layout (mav0/cam0), or a video; or observations of "
           "numbered points, CSV: frame,t_s,point_id,u_px,v_px, in order of time; - reads these rows from standard "
-          "input and answers each frame")
+          "input and answers each frame by its filter; --imu, --depth-sensor, --range and --odometry count in the path "
+          "that is solved at the end")
       ->required();
   app.add_fields(command, fields_of(*args));
   add_live_options(command, args->live);

@@ -86,6 +86,12 @@ std::vector<StoredBlock> earlier_blocks(const StudyOptions& options, const Study
                                 blocks_folder(out).string()));
 }
 
+void add_speed(std::uint64_t num_trials, double seconds, JobOutcome& outcome) {
+  if (num_trials == 0) return;
+  outcome.lines.push_back(fmt::format("{} trials in {:.3g} s: {:.3g} ms each", num_trials, seconds,
+                                      1e3 * seconds / static_cast<double>(num_trials)));
+}
+
 ExitCode run_plan(const StudyPlan& plan, const StudyOptions& options, std::uint64_t block_size, Run& run) {
   const Shard shard = shard_from(options.shard);
   const std::filesystem::path& out = run.options.out;
@@ -121,11 +127,7 @@ ExitCode run_plan(const StudyPlan& plan, const StudyOptions& options, std::uint6
   }
   run.lap("trials");
   JobOutcome outcome = outcome_of(plan.header, points, shard);
-  const double seconds = run.document.seconds.back().second;
-  if (num_trials > 0) {
-    outcome.lines.push_back(fmt::format("{} trials in {:.3g} s: {:.3g} ms each", num_trials, seconds,
-                                        1e3 * seconds / static_cast<double>(num_trials)));
-  }
+  add_speed(num_trials, run.document.seconds.back().second, outcome);
   return run.finish(std::move(outcome));
 }
 

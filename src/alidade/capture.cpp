@@ -115,6 +115,7 @@ struct CaptureGuide::State {
   void keep(BoardView view);
   void solve();
   void fill_state();
+  CaptureLook look_without_board();
   CaptureLook judge(const cv::Mat* image, double t_s);
   [[nodiscard]] double asked_gain(double t_s) const;
   [[nodiscard]] double gain_of(const BoardView& view) const;
@@ -233,22 +234,27 @@ bool CaptureGuide::State::recalls(double t_s, CaptureLook& look) const {
   return true;
 }
 
+/// No board, or another one.
+CaptureLook CaptureGuide::State::look_without_board() {
+  still_since_s.reset();
+  CaptureLook look;
+  std::tie(look.other_cols, look.other_rows) = seen.other_grid;
+  const bool is_other = seen.other_grid.first > 0;
+  look.status = is_other ? LookStatus::other_board : LookStatus::nothing;
+  look.words = look.words_mirrored =
+      is_other ? fmt::format("a board of {}×{} corners is in view, not of {}×{}", seen.other_grid.first,
+                             seen.other_grid.second, board.cols, board.rows)
+               : "no board in view";
+  return look;
+}
+
 CaptureLook CaptureGuide::State::judge(const cv::Mat* image, double t_s) {
+  if (!seen.found()) return look_without_board();
   CaptureLook look;
   const auto say = [&](LookStatus status, const std::string& words) {
     look.status = status;
     look.words = look.words_mirrored = words;
   };
-  if (!seen.found()) {
-    still_since_s.reset();
-    const bool is_other = seen.other_grid.first > 0;
-    std::tie(look.other_cols, look.other_rows) = seen.other_grid;
-    say(is_other ? LookStatus::other_board : LookStatus::nothing,
-        is_other ? fmt::format("a board of {}×{} corners is in view, not of {}×{}", seen.other_grid.first,
-                               seen.other_grid.second, board.cols, board.rows)
-                 : "no board in view");
-    return look;
-  }
   look.corners_px = pixels_of(seen.view);
   if (!took_s) took_s = t_s;
   const bool is_still = stands_still(t_s);

@@ -86,15 +86,17 @@ LensSoFar lens_so_far(const Board& board, const std::vector<BoardView>& views, c
   return lens;
 }
 
-std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& views) {
-  constexpr std::size_t enough = 6;
-  constexpr double min_walk = 0.004, max_z = 6.0;  // of the focal length; standard deviations
-  if (!lens.is_solved || views.size() < enough) return "";
+namespace {
+
+/// A photo's own focal length beside that of all.
+struct OwnFocal {
+  double change = 0.0, sigma = 0.0;  ///< Relative.
+};
+
+/// One Gauss–Newton step of each photo's focal length and pose, the rest of the lens fixed.
+std::vector<OwnFocal> own_focals(const LensSoFar& lens, const std::vector<BoardView>& views) {
   const double focal_px = params(lens.camera.lens)[0];
-  struct Own {
-    double change = 0.0, sigma = 0.0;  ///< Of the focal length, relative.
-  };
-  std::vector<Own> own;
+  std::vector<OwnFocal> own;
   for (std::size_t k = 0; k < views.size(); ++k) {
     const ViewFit& fit = lens.report.views[k];
     if (!fit.used) continue;
@@ -114,13 +116,24 @@ std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& view
     if (!(information > 0.0)) continue;
     own.push_back({-g.sum() / information / focal_px, lens.report.noise_px / std::sqrt(information) / focal_px});
   }
+  return own;
+}
+
+}  // namespace
+
+std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& views) {
+  constexpr std::size_t enough = 6;
+  constexpr double min_walk = 0.004, max_z = 6.0;  // of the focal length; standard deviations
+  if (!lens.is_solved || views.size() < enough) return "";
+  std::vector<OwnFocal> own = own_focals(lens, views);
   // Informative photos only: those taken head on do not separate focal length and distance.
-  std::erase_if(own, [](const Own& each) { return !(each.sigma < 0.25 * min_walk); });
+  std::erase_if(own, [](const OwnFocal& each) { return !(each.sigma < 0.25 * min_walk); });
   if (own.size() < enough) return "";
-  const auto [least, most] = std::ranges::minmax_element(own, {}, &Own::change);
+  const auto [least, most] = std::ranges::minmax_element(own, {}, &OwnFocal::change);
   const double walk = most->change - least->change, sigma = std::hypot(most->sigma, least->sigma);
   double chi2 = 0.0;
-  for (const Own& each : own) chi2 += std::pow(each.change / each.sigma, 2);
+  for (const OwnFocal& each : own) chi2 += std::pow(each.change / each.sigma, 2);
+  const double focal_px = params(lens.camera.lens)[0];
   const double per_photo = chi2 / static_cast<double>(own.size());
   if (walk < min_walk || walk < max_z * sigma || per_photo < 9.0) return "";
   return fmt::format(

@@ -222,6 +222,15 @@ void FolderSwap::sync_places() const {
   sync_all(unique(std::move(folders)));
 }
 
+/// A file of an earlier result goes into the hidden folder.
+void FolderSwap::set_aside(const fs::path& name) {
+  const fs::path at = folder_ / name;
+  std::error_code ignored;
+  if (!stands_at(at) || fs::is_directory(fs::symlink_status(at, ignored))) return;
+  fs::create_directories((hidden_ / older_files / name).parent_path());
+  move(at, hidden_ / older_files / name);
+}
+
 void FolderSwap::commit() {
   sync_new();
   std::vector<fs::path> going = added_;
@@ -233,10 +242,7 @@ void FolderSwap::commit() {
     fs::create_directory(hidden_ / older_files);
     for (const fs::path& name : going) {
       at = folder_ / name;
-      std::error_code ignored;
-      if (!stands_at(at) || fs::is_directory(fs::symlink_status(at, ignored))) continue;
-      fs::create_directories((hidden_ / older_files / name).parent_path());
-      move(at, hidden_ / older_files / name);
+      set_aside(name);
     }
     move(hidden_ / older_files, hidden_ / replaced_files);
     for (auto name = added_.rbegin(); name != added_.rend(); ++name) {

@@ -62,6 +62,7 @@ class FolderSwap {
 
   bool hide();
   void move(const std::filesystem::path& from, const std::filesystem::path& to);
+  void set_aside(const std::filesystem::path& name);
   void undo() noexcept;
   void sync_new() const;
   void sync_places() const;

@@ -40,49 +40,59 @@ struct Fit {
 
 bool is_seen(const Eigen::Vector2d& px) { return std::isfinite(px.x()) && std::isfinite(px.y()); }
 
-/// One Gauss–Newton step; the gain in squares, or a negative number where it is none.
-double take_step(const std::vector<KeptRow>& rows, int num_points, Fit& fit) {
+/// Normal equations of the intrinsics, the points eliminated.
+struct Reduced {
   Eigen::Matrix4d S = Eigen::Matrix4d::Zero();
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
-  std::array<Eigen::Vector2d, max_fleet_points> g;
+  std::array<Eigen::Vector2d, max_fleet_points> g{};  ///< Gradient of each point.
+  double gain = 0.0;                                  ///< In squares, of the points alone.
+};
+
+/// Adds what the rows say of point k, and eliminates it; false where it cannot be.
+bool add_point(const std::vector<KeptRow>& rows, std::size_t k, Fit& fit, Reduced& reduced) {
+  const auto basis = basis_beside(fit.direction[k]);
+  Eigen::Vector4d own = Eigen::Vector4d::Zero();
+  for (const KeptRow& row : rows) {
+    if (!is_seen(row.px[k])) continue;
+    const FleetPrediction at = FleetView(row.rotation, fit.x).predict(fit.direction[k]);
+    if (!at.is_seen) return false;
+    const Eigen::Vector2d residual = row.px[k] - at.px;
+    const Eigen::Matrix2d J = at.by_ray * basis;
+    const Eigen::Matrix<double, 2, 4> J_k = at.by_common.leftCols<4>();
+    fit.D[k] += J.transpose() * J;
+    fit.B[k] += J.transpose() * J_k;
+    reduced.g[k] += J.transpose() * residual;
+    reduced.S += J_k.transpose() * J_k;
+    own += J_k.transpose() * residual;
+    fit.squares += residual.squaredNorm();
+  }
+  if (!(fit.D[k].determinant() > 0.0)) return false;
+  const Eigen::Matrix2d inverse = fit.D[k].inverse();
+  reduced.S -= fit.B[k].transpose() * inverse * fit.B[k];
+  reduced.gradient += own - fit.B[k].transpose() * (inverse * reduced.g[k]);
+  reduced.gain += reduced.g[k].dot(inverse * reduced.g[k]);
+  return true;
+}
+
+/// One Gauss–Newton step; the gain in squares, or a negative number where it is none.
+double take_step(const std::vector<KeptRow>& rows, int num_points, Fit& fit) {
+  Reduced reduced;
   fit.squares = 0.0;
-  double gain = 0.0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(num_points); ++k) {
     fit.D[k].setZero();
     fit.B[k].setZero();
-    g[k].setZero();
-    if (fit.num_seen[k] < 3) continue;
-    const auto basis = basis_beside(fit.direction[k]);
-    Eigen::Vector4d own = Eigen::Vector4d::Zero();
-    for (const KeptRow& row : rows) {
-      if (!is_seen(row.px[k])) continue;
-      const FleetPrediction at = FleetView(row.rotation, fit.x).predict(fit.direction[k]);
-      if (!at.is_seen) return -1.0;
-      const Eigen::Vector2d residual = row.px[k] - at.px;
-      const Eigen::Matrix2d J = at.by_ray * basis;
-      const Eigen::Matrix<double, 2, 4> J_k = at.by_common.leftCols<4>();
-      fit.D[k] += J.transpose() * J;
-      fit.B[k] += J.transpose() * J_k;
-      g[k] += J.transpose() * residual;
-      S += J_k.transpose() * J_k;
-      own += J_k.transpose() * residual;
-      fit.squares += residual.squaredNorm();
-    }
-    if (!(fit.D[k].determinant() > 0.0)) return -1.0;
-    const Eigen::Matrix2d inverse = fit.D[k].inverse();
-    S -= fit.B[k].transpose() * inverse * fit.B[k];
-    gradient += own - fit.B[k].transpose() * (inverse * g[k]);
-    gain += g[k].dot(inverse * g[k]);
+    reduced.g[k].setZero();
+    if (fit.num_seen[k] >= 3 && !add_point(rows, k, fit, reduced)) return -1.0;
   }
-  const Eigen::LLT<Eigen::Matrix4d> llt(S);
+  const Eigen::LLT<Eigen::Matrix4d> llt(reduced.S);
   if (llt.info() != Eigen::Success) return -1.0;
-  const Eigen::Vector4d move = llt.solve(gradient);
-  gain += move.dot(gradient);
+  const Eigen::Vector4d move = llt.solve(reduced.gradient);
+  const double gain = reduced.gain + move.dot(reduced.gradient);
   fit.x.head<4>() += move;
   fit.cov = llt.solve(Eigen::Matrix4d::Identity());
   for (std::size_t k = 0; k < static_cast<std::size_t>(num_points); ++k) {
     if (fit.num_seen[k] < 3) continue;
-    const Eigen::Vector2d by = fit.D[k].inverse() * (g[k] - fit.B[k] * move);
+    const Eigen::Vector2d by = fit.D[k].inverse() * (reduced.g[k] - fit.B[k] * move);
     fit.direction[k] = (fit.direction[k] + basis_beside(fit.direction[k]) * by).normalized();
   }
   const bool is_possible = fit.x[0] > 1.0 && fit.x[1] > 1.0 && std::isfinite(gain);

@@ -57,6 +57,20 @@ Rigid3 cam_from_base(Head head, const Eigen::Vector2d& readings_rad) {
   return cam_from_world(head, readings_rad);
 }
 
+/// The spline through the path of the start, at the work's times.
+void set_path(double scale, Placing& work) {
+  const MovingStart& start = work.start;
+  const std::size_t reference = work.problem.reference;
+  std::vector<Eigen::Vector3d> path;
+  for (const Eigen::Vector3d& at : start.path)
+    path.emplace_back(scale * (start.cameras[reference].cam_from_world * at));
+  // Knots counted from the reference's first observation: the same ones wherever the path is thought to begin.
+  const double anchor_s = work.series[reference].t_s.front();
+  const double before = std::floor((work.path_t_s.front() - anchor_s) / work.knot_s + 1e-6) - 1.0;
+  work.state.path = spline_through(work.path_t_s, path, anchor_s + before * work.knot_s,
+                                   work.path_t_s.back() + work.knot_s, work.knot_s);
+}
+
 /// World and clock become those of the reference camera; lengths those of the distance given, if there is one.
 void set_state(Placing& work) {
   const MovingStart& start = work.start;
@@ -88,16 +102,8 @@ void set_state(Placing& work) {
     work.state.offset_s[h] = work.problem.mid_s[h] - in_rig(at_s);
     work.state.drift[h] = 1.0 - first.rate / camera.rate;
   }
-  std::vector<Eigen::Vector3d> path;
-  for (std::size_t i = 0; i < start.t_s.size(); ++i) {
-    work.path_t_s.push_back(in_rig(start.t_s[i]));
-    path.emplace_back(scale * (first.cam_from_world * start.path[i]));
-  }
-  // Knots counted from the reference's first observation: the same ones wherever the path is thought to begin.
-  const double anchor_s = work.series[reference].t_s.front();
-  const double before = std::floor((work.path_t_s.front() - anchor_s) / work.knot_s + 1e-6) - 1.0;
-  work.state.path = spline_through(work.path_t_s, path, anchor_s + before * work.knot_s,
-                                   work.path_t_s.back() + work.knot_s, work.knot_s);
+  for (const double t_s : start.t_s) work.path_t_s.push_back(in_rig(t_s));
+  set_path(scale, work);
 }
 
 /// Observations where the path is known, four a knot or fewer: each so-and-so many-th of a camera.

@@ -41,6 +41,31 @@ void finish(PatchView& view) {
   view.shift_information << uu, uv, uv, vv;
 }
 
+/// A pixel more than a view on every side, for its derivatives.
+constexpr int wide_half_px = PatchView::half_px + 1, wide_side_px = 2 * wide_half_px + 1;
+using WideView = std::array<float, static_cast<std::size_t>(wide_side_px) * wide_side_px>;
+
+/// The patch seen through a map, between its pixels bilinear.
+WideView warped(std::span<const std::uint8_t, ReferencePatch::area_px> grey, const Eigen::Matrix2f& first_from_here) {
+  constexpr int half = wide_half_px, side = wide_side_px;
+  constexpr float last = ReferencePatch::side_px - 1.001f;
+  WideView wide{};
+  for (int y = -half; y <= half; ++y) {
+    for (int x = -half; x <= half; ++x) {
+      const Eigen::Vector2f at = first_from_here * Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y));
+      const float s = std::clamp(at.x() + ReferencePatch::half_px, 0.0f, last),
+                  t = std::clamp(at.y() + ReferencePatch::half_px, 0.0f, last);
+      const int col = static_cast<int>(s), row = static_cast<int>(t);
+      const float a = s - static_cast<float>(col), b = t - static_cast<float>(row);
+      const std::uint8_t* const g = &grey[static_cast<std::size_t>(row * ReferencePatch::side_px + col)];
+      wide[static_cast<std::size_t>((y + half) * side + x + half)] =
+          (1 - b) * ((1 - a) * g[0] + a * g[1]) +
+          b * ((1 - a) * g[ReferencePatch::side_px] + a * g[ReferencePatch::side_px + 1]);
+    }
+  }
+  return wide;
+}
+
 }  // namespace
 
 ReferencePatch::ReferencePatch(const cv::Mat& grey, int u, int v) {
@@ -56,21 +81,8 @@ ReferencePatch::ReferencePatch(std::span<const std::uint8_t, area_px> grey) {
 
 std::optional<PatchView> ReferencePatch::seen_through(const Eigen::Matrix2d& here_from_first) const {
   if (!is_usable(here_from_first)) return std::nullopt;
-  const Eigen::Matrix2f first_from_here = here_from_first.inverse().cast<float>();
-  constexpr int half = PatchView::half_px + 1, side = 2 * half + 1;  // a pixel more, for the derivatives
-  constexpr float last = side_px - 1.001f;
-  std::array<float, static_cast<std::size_t>(side) * side> wide{};
-  for (int y = -half; y <= half; ++y) {
-    for (int x = -half; x <= half; ++x) {
-      const Eigen::Vector2f at = first_from_here * Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y));
-      const float s = std::clamp(at.x() + half_px, 0.0f, last), t = std::clamp(at.y() + half_px, 0.0f, last);
-      const int col = static_cast<int>(s), row = static_cast<int>(t);
-      const float a = s - static_cast<float>(col), b = t - static_cast<float>(row);
-      const std::uint8_t* const g = &grey_[static_cast<std::size_t>(row * side_px + col)];
-      wide[static_cast<std::size_t>((y + half) * side + x + half)] =
-          (1 - b) * ((1 - a) * g[0] + a * g[1]) + b * ((1 - a) * g[side_px] + a * g[side_px + 1]);
-    }
-  }
+  const WideView wide = warped(grey_, here_from_first.inverse().cast<float>());
+  constexpr int side = wide_side_px;
   PatchView view;
   double sum = 0.0;
   std::size_t i = 0;

@@ -137,18 +137,19 @@ LoopShares loop_shares(const ReproduceConfig& config, double sigma_d_rad) {
   return {quantile_of(fed_back, 0.5), quantile_of(truth, 0.5)};
 }
 
-}  // namespace
-
-Experiment xiahou_loop(const ReproduceConfig& config) {
-  constexpr double sigma_d_rad = 0.5 * degree;
-  const LoopShares shares = loop_shares(config, sigma_d_rad);
-  const std::vector<LoopStep> quiet = run_printed_loop(0.0, 1);
-  const ServoRun ours = run_servo(xiahou_servo_scene(), {}, config.seed);
-  const double target_deg = travel_deg(quiet, &LoopStep::to_target_rad);
-  double ours_most = 0.0;
-  for (const ServoRow& row : ours.rows)
+/// How far the first head pans.
+double pan_travel_deg(const ServoRun& run) {
+  double most = 0.0;
+  for (const ServoRow& row : run.rows)
     if (row.head == 0)
-      ours_most = std::max(ours_most, std::abs(row.measured_rad.x() - ours.rows.front().measured_rad.x()) / degree);
+      most = std::max(most, std::abs(row.measured_rad.x() - run.rows.front().measured_rad.x()) / degree);
+  return most;
+}
+
+/// The claims, by the loop as printed with (shares) and without disturbances, and by ours.
+std::vector<Claim> loop_claims(const LoopShares& shares, const ServoRun& ours) {
+  const std::vector<LoopStep> quiet = run_printed_loop(0.0, 1);
+  const double target_deg = travel_deg(quiet, &LoopStep::to_target_rad);
   Claim fed_back{"loop-fed-back", "what is fed back stays in the central third of both images", "%", not_a_number,
                  shares.fed_back_percent};
   fed_back.holds = near_to(fed_back.rerun, 100.0, 0.01);
@@ -167,10 +168,18 @@ Experiment xiahou_loop(const ReproduceConfig& config) {
               "°",
               not_a_number,
               travel_deg(quiet, &LoopStep::pan_tilt_rad),
-              ours_most};
+              pan_travel_deg(ours)};
   moves.holds = near_to(moves.rerun, target_deg, 0.1);
   moves.words = fmt::format("The target's own is {:.1f}°. All that moves this loop is d1 to d4.", target_deg);
   for (Claim* claim : {&fed_back, &follows, &moves}) claim->figure = "2";
+  return {fed_back, follows, moves};
+}
+
+}  // namespace
+
+Experiment xiahou_loop(const ReproduceConfig& config) {
+  constexpr double sigma_d_rad = 0.5 * degree;
+  const LoopShares shares = loop_shares(config, sigma_d_rad);
   return {
       "loop",
       "Figure 2: the loop as printed",
@@ -178,7 +187,7 @@ Experiment xiahou_loop(const ReproduceConfig& config) {
       "projected with the same angles, is what the PI controllers compare with the image centre.",
       "d1 to d4: white, 0.5°; the paper does not say what they are. Plant in degrees, error in pixels, circle of 10 "
       "cm in 10 s, which enters nowhere but in the true image.",
-      {fed_back, follows, moves},
+      loop_claims(shares, run_servo(xiahou_servo_scene(), {}, config.seed)),
       {loop_figure(run_printed_loop(sigma_d_rad, 300 * config.seed))}};
 }
 

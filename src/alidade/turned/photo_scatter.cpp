@@ -17,6 +17,17 @@ TurnedInformation positive_part(const TurnedInformation& M) {
   return eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }
 
+/// The model's covariance and what the photos scatter beyond it; whitened by the model's.
+TurnedInformation with_scatter(const TurnedInformation& seen, const TurnedInformation& expected, double n,
+                               const ScatterCovariance& scatter) {
+  const double shrink = std::min(1.0, 8.0 / n);
+  const double excess = std::max(scatter.design_effect - 1.0, 0.0);
+  const TurnedInformation added =
+      shrink * excess * expected + (1.0 - shrink) * positive_part(TurnedInformation(seen - expected));
+  const double nu = std::max(scatter.degrees_of_freedom, 4.0);
+  return TurnedInformation::Identity() + nu / (nu - 2.0) * added;
+}
+
 }  // namespace
 
 ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progress) {
@@ -51,14 +62,8 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
   expected = positive_part(expected);
   scatter.design_effect = expected.trace() > 0.0 ? seen.trace() / expected.trace() : 1.0;
   scatter.degrees_of_freedom = sum2 > 0.0 ? std::max(sum * sum / sum2, 2.0) : n;
-  const double shrink = std::min(1.0, 8.0 / n);
-  const double excess = std::max(scatter.design_effect - 1.0, 0.0);
-  const TurnedInformation added =
-      shrink * excess * expected + (1.0 - shrink) * positive_part(TurnedInformation(seen - expected));
-  const double nu = std::max(scatter.degrees_of_freedom, 4.0);
-  const TurnedInformation inside = TurnedInformation::Identity() + nu / (nu - 2.0) * added;
   const TurnedInformation L = root.matrixL();
-  scatter.cov = L * inside * L.transpose();
+  scatter.cov = L * with_scatter(seen, expected, n, scatter) * L.transpose();
   return scatter;
 }
 

@@ -153,7 +153,8 @@ void add_readings(std::span<const ServoSample> log, const ServoIdentification& i
                               step_rad, 2.0 * identified.fit.rms_rad, "rad", ""});
 }
 
-Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& identified) {
+/// What the log does not determine; nothing where it determines gain, time constant and latency.
+std::optional<Verdict> refusal(std::span<const ServoSample> log, const ServoIdentification& identified) {
   const std::string excite = "log a step or a chirp of the command that moves the axis by degrees";
   if (log.size() < 20)
     return refused("only " + std::to_string(log.size()) + " rows: too few for five parameters", "log at least 20 rows");
@@ -161,7 +162,6 @@ Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& 
     return refused("no excitation: the command is " + text_of(log.front().command) + " throughout", excite);
   const ServoFit& fit = identified.fit;
   if (!(identified.angle_range_rad > 0.0)) return refused("no answer: the angle never changes", excite);
-  const bool is_angle = fit.kind == ServoKind::angle;
   if (!fit.is_observable)
     return refused("the log cannot separate gain, time constant and latency",
                    "log until the axis has come to rest, "
@@ -175,9 +175,16 @@ Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& 
     return refused("too short or too coarse: the time constant is " + text_of(fit.params[1]) + " s with σ " +
                        text_of(sigma[1]) + " s",
                    "log for several time constants after a change of command, and faster");
-  if (is_angle && fit.params[1] > identified.duration_s)
+  if (fit.kind == ServoKind::angle && fit.params[1] > identified.duration_s)
     return refused("too short: the time constant " + text_of(fit.params[1]) + " s is longer than the log",
                    "log for several time constants after a change of command");
+  return std::nullopt;
+}
+
+Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& identified) {
+  if (auto refused = refusal(log, identified)) return *std::move(refused);
+  const ServoFit& fit = identified.fit;
+  const bool is_angle = fit.kind == ServoKind::angle;
   Verdict verdict;
   add_readings(log, identified, verdict);
   add_checks(log, identified, verdict);

@@ -180,30 +180,32 @@ void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdic
                                    std::sqrt(report.inflation), 1.0, "1"));
 }
 
+Check nis_check(double nis) {
+  const bool is_good = nis >= good_nis_low && nis <= good_nis_high;
+  const std::string text = nis > good_nis_high  ? "noise is larger than stated, or the rig is wrong"
+                           : nis < good_nis_low ? "noise is smaller than stated"
+                                                : "innovations as large as predicted";
+  return check("NIS",
+               is_good         ? State::good
+               : nis > max_nis ? State::bad
+                               : State::care,
+               text_of(nis, 3) + " per degree of freedom: " + text, nis, good_nis_high, "1");
+}
+
+/// Only who has the truth sees a wrong focal length: a head that follows keeps the target central.
+Check truth_check(const TrackReport& report) {
+  const double nees = report.nees_per_dof, ratio = std::sqrt(nees);
+  const double max_good = report.errors_are_counted ? good_nees_of_one : good_nees;
+  return check("truth",
+               nees > max_nees   ? State::bad
+               : nees > max_good ? State::care
+                                 : State::good,
+               "the errors are " + text_of(ratio, 2) + " times their σ", ratio, std::sqrt(max_good), "σ");
+}
+
 void add_checks(const TrackReport& report, Verdict& verdict) {
-  const double nis = report.nis_per_dof;
-  if (std::isfinite(nis)) {
-    const bool is_good = nis >= good_nis_low && nis <= good_nis_high;
-    const std::string text = nis > good_nis_high  ? "noise is larger than stated, or the rig is wrong"
-                             : nis < good_nis_low ? "noise is smaller than stated"
-                                                  : "innovations as large as predicted";
-    verdict.checks.push_back(check("NIS",
-                                   is_good         ? State::good
-                                   : nis > max_nis ? State::bad
-                                                   : State::care,
-                                   text_of(nis, 3) + " per degree of freedom: " + text, nis, good_nis_high, "1"));
-  }
-  const double nees = report.nees_per_dof;
-  if (std::isfinite(
-          nees)) {  // only who has the truth sees a wrong focal length: a head that follows keeps the target central
-    const double ratio = std::sqrt(nees), max_good = report.errors_are_counted ? good_nees_of_one : good_nees;
-    verdict.checks.push_back(check("truth",
-                                   nees > max_nees   ? State::bad
-                                   : nees > max_good ? State::care
-                                                     : State::good,
-                                   "the errors are " + text_of(ratio, 2) + " times their σ", ratio, std::sqrt(max_good),
-                                   "σ"));
-  }
+  if (std::isfinite(report.nis_per_dof)) verdict.checks.push_back(nis_check(report.nis_per_dof));
+  if (std::isfinite(report.nees_per_dof)) verdict.checks.push_back(truth_check(report));
   const auto num_alone = static_cast<double>(count(report, TrackEvent::one_head));
   const double alone = num_alone / static_cast<double>(report.steps.size());
   verdict.checks.push_back(check("both heads", alone > 0.02 ? State::care : State::good,

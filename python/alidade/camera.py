@@ -216,7 +216,7 @@ class Camera:
         raise AttributeError(f"a {self._core.model} camera has no '{name}'{hint}")
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self.parameter_names]
+        return sorted({*super().__dir__(), *self.parameter_names})
 
     def _state(self) -> tuple[Any, ...]:
         core = self._core

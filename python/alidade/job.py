@@ -31,6 +31,9 @@ Options = dict[str, tuple[str, bool, bool, str]]
 PHOTO_COLUMNS = ("photo", "photo_off")
 #: The file of a result that a keyword takes, where it is not called like it.
 FILE_OF = {"beam": "rangefinder"}
+#: What OpenCV's users and the command line give beside the board; here it is the board's own.
+BOARD_FIELDS = ("square_m", "square", "square_size", "marker_m", "marker", "board_kind", "dictionary")
+OF_THE_BOARD = ': it is the board\'s, as in board=al.Board("9x6", square_m=0.025)'
 Photos = Union[str, "os.PathLike[str]", "abc.Sequence[Any]", "np.ndarray[Any, Any]"]
 
 
@@ -42,7 +45,8 @@ def given_of(function: Callable[..., Any], values: dict[str, Any], aliases: dict
     for name, value in more.items():
         if name not in aliases:
             known = [*standard, *aliases]
-            raise TypeError(f"{function.__name__}() has no keyword '{name}'{suggestion(name, known)}")
+            hint = OF_THE_BOARD if name in BOARD_FIELDS and "board" in standard else suggestion(name, known)
+            raise TypeError(f"{function.__name__}() has no keyword '{name}'{hint}")
         if aliases[name] in given:
             raise TypeError(f"{function.__name__}(): '{name}' and '{aliases[name]}' are the same")
         given[aliases[name]] = value

@@ -311,7 +311,7 @@ class Result:
         raise AttributeError(f"this result of {self.command} has no '{name}'{suggestion(name, dir(self))}")
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self.estimate]
+        return sorted({*super().__dir__(), *self.estimate})
 
     def _comparable(self) -> dict[str, Any]:
         passing = ("argv", "created_utc", "seconds", "inputs", "files", "data", "grids")

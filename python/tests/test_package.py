@@ -41,6 +41,8 @@ class Package(unittest.TestCase):
         for work, error, words in ((lambda: camera.K, AttributeError, "K, dist = camera.to_opencv()"), (lambda: camera.save, AttributeError, "write(file)"),
                                    (lambda: camera.undistorts, AttributeError, "did you mean 'undistort'?"), (lambda: result.rms, AttributeError, "did you mean 'rms_px'?"),
                                    (lambda: al.calibrate("photos", board=BOARD, modle="brown"), TypeError, "did you mean 'model'?"),
+                                   (lambda: al.calibrate("photos", board="9x6", square_m=0.025), TypeError, "al.Board("),
+                                   (lambda: al.track("events.csv", rig="rig.yaml", square_m=0.025), TypeError, "no keyword"),
                                    (lambda: camera.undistort("photo.png"), ValueError, "cv2.imread('photo.png') reads one")):
             with self.subTest(words=words), self.assertRaises(error) as caught:
                 work()

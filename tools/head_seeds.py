@@ -82,8 +82,9 @@ def one_seed(alidade, world, seed):
             "delay": abs(value["delay_s"] - true["delay_s"]), "time": document["estimate"]["head_time_s"], "same": offline == value}
 
 
-def tell(rows):
+def tell(rows, failed):
     """A table, and whether all of it held."""
+    if not rows: return False
     offs = [abs(x) for row in rows for x in row["off"].values()]
     within = sum(x <= 3.0 for x in offs)
     lines = [("values within 3σ", f"{within} of {len(offs)}, RMS {math.sqrt(sum(x * x for x in offs) / len(offs)):.2f} σ", within >= 0.975 * len(offs)),
@@ -92,8 +93,9 @@ def tell(rows):
              ("delay, off by at most", f"{1e3 * max(row['delay'] for row in rows):.2f} ms", all(row["delay"] < DELAY_S for row in rows)),
              ("head time", f"{min(row['time'] for row in rows):.0f} … {max(row['time'] for row in rows):.0f} s", all(row["time"] <= HEAD_S for row in rows)),
              ("off line the same to the last digit", f"{sum(row['same'] for row in rows)} of {len(rows)}", all(row["same"] for row in rows)),
-             ("verdict good", f"{sum(row['state'] == 'good' for row in rows)} of {len(rows)}", all(row["code"] == 0 for row in rows))]
-    print(f"\n| {len(rows)} seeds | seen |\n|---|---|")
+             ("verdict good", f"{sum(row['state'] == 'good' for row in rows)} of {len(rows)}", all(row["code"] == 0 for row in rows)),
+             ("without an answer", f"{failed}", failed == 0)]
+    print(f"\n| {len(rows) + failed} seeds | seen |\n|---|---|")
     for what, seen, holds in lines: print(f"| {what} | {seen}{'' if holds else ' ✗'} |")
     return all(holds for _, _, holds in lines)
 
@@ -106,15 +108,19 @@ def main():
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--together", type=int, default=2)
     options = parser.parse_args()
-    rows = []
+    rows, failed = [], 0
     with concurrent.futures.ThreadPoolExecutor(options.together) as pool:
         jobs = [pool.submit(one_seed, str(options.alidade.resolve()), options.world.resolve(), options.first + i) for i in range(options.seeds)]
         for job in concurrent.futures.as_completed(jobs):
-            rows.append(job.result())
-            row = rows[-1]
+            try: row = job.result()
+            except (RuntimeError, OSError, KeyError, ValueError) as fault:
+                failed += 1
+                print(f"seed {options.first + jobs.index(job)}: {fault}", flush=True)
+                continue
+            rows.append(row)
             print(f"seed {row['seed']}: {row['state']}, f off {100 * row['focal']:.4f} %, delay {1e3 * row['delay']:.2f} ms, {row['time']:.0f} s, "
                   + " ".join(f"{k} {x:+.1f}σ" for k, x in row["off"].items()) + ("" if row["same"] else ", off line another") + "".join("\n    " + each for each in row["cares"]), flush=True)
-    return 0 if tell(rows) else 1
+    return 0 if tell(rows, failed) else 1
 
 
 if __name__ == "__main__":

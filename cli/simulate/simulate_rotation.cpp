@@ -164,6 +164,7 @@ TurnedScene turned_scene_of(const SimulateRotationArgs& args, const RotationScen
   turned.cx = args.k[2];
   turned.cy = args.k[3];
   turned.k1 = args.k1;
+  turned.k2 = args.k2;
   turned.num_photos = args.photos;
   turned.pan_step_rad = 0.4 * scene.width_px / args.k[0];  // six tenths of each photo are the next one's
   turned.tilt_rad = 0.2 * scene.height_px / args.k[1];
@@ -182,13 +183,15 @@ TurnedScene turned_scene_of(const SimulateRotationArgs& args, const RotationScen
 /// Photos of a camera rotated by hand, and matches between them: what `observe PHOTOS` and `--pairs` take. The
 /// photos' world is far away and is static; lever, depths, what moves and wrong matches are of pairs.csv.
 ExitCode simulate_photos(const SimulateRotationArgs& args, const RotationScene& scene, Run& run) {
+  if (args.k3 != 0.0 || args.p1 != 0.0 || args.p2 != 0.0)
+    throw UsageError("--k3, --p1 and --p2 are not of --photos, whose matches have k1 and k2");
   const TurnedScene turned = turned_scene_of(args, scene);
   FarWorld world = world_of(args, run);
   const std::vector<Eigen::Quaterniond> attitudes = turned_attitudes(turned, run.options.seed);
   for (std::size_t k = 0; k < attitudes.size(); ++k) {
     report_progress(run.progress, "photos", k, attitudes.size());
     const double zoom = k < turned.zoom.size() ? turned.zoom[k] : 1.0;
-    const RotatingIntrinsics intrinsics{zoom * turned.fx, zoom * turned.fy, turned.cx, turned.cy, turned.k1};
+    const RotatingIntrinsics intrinsics{zoom * turned.fx, zoom * turned.fy, turned.cx, turned.cy, turned.k1, turned.k2};
     run.add_file(fmt::format("photos/photo{:03}.png", k + 1),
                  png_bytes(render_panorama(world, intrinsics, scene.width_px, scene.height_px, attitudes[k].conjugate(),
                                            args.panorama, run.options.seed + k + 1)));
@@ -202,11 +205,11 @@ ExitCode simulate_photos(const SimulateRotationArgs& args, const RotationScene& 
   return run.finish(verdict);
 }
 
-ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
+RotationScene scene_of(const SimulateRotationArgs& args, std::uint64_t seed) {
   RotationScene scene;
   std::tie(scene.width_px, scene.height_px) = image_size(args.size);
   if (std::min(scene.width_px, scene.height_px) < 240) throw UsageError("--size: points need 240 px and more");
-  scene.start_px = draw_points(scene.width_px, scene.height_px, args.points, run.options.seed);
+  scene.start_px = draw_points(scene.width_px, scene.height_px, args.points, seed);
   scene.intrinsics = [&args](double t_s) { return intrinsics_at(args, t_s); };
   scene.motion = motion_of(args);
   scene.delay_s = args.delay_s;
@@ -215,9 +218,14 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   if (!args.mount_deg.empty()) scene.mount_rad = Eigen::Vector3d(args.mount_deg.data()) * std::numbers::pi / 180.0;
   if (!args.lever.empty()) scene.lever_arm_m = Eigen::Vector3d(args.lever.data());
   if (!args.depth.empty()) {
-    Draws draws(run.options.seed + 1);
+    Draws draws(seed + 1);
     for (int i = 0; i < args.points; ++i) scene.depth_m.push_back(draws.uniform(args.depth[0], args.depth[1]));
   }
+  return scene;
+}
+
+ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
+  const RotationScene scene = scene_of(args, run.options.seed);
   RotationLogConfig config = args.config;
   config.source = source_of(args.source);
   config.with_range = !args.depth.empty() && args.with_range;

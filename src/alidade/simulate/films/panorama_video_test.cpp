@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 
 #include "alidade/pantilt/head_rotation.h"
 #include "alidade/simulate/rotating_lens.h"
@@ -74,9 +76,11 @@ TEST(Panorama, PutsSpotsWhereTheLensDoes) {
   const std::vector<cv::Point> spots = {{150, 100}, {100, 60}, {215, 80}, {90, 150}, {200, 145}};
   constexpr double rad_per_px = 1.0 / 280.0;
   FarWorld world = FarWorld::of_photo(photo_of_spots(spots), rad_per_px);
-  for (const double k1 : {0.0, -0.2}) {
+  using Bends = std::array<double, 5>;
+  for (const auto& [k1, k2, k3, p1, p2] : {Bends{}, Bends{-0.2}, Bends{0.0, -0.3}, Bends{0.0, 0.0, 0.0, 0.02, -0.015},
+                                           Bends{-0.2, 0.05, -0.01, -0.01, 0.02}}) {
     RotatingIntrinsics lens = camera;
-    lens.k1 = k1;
+    std::tie(lens.k1, lens.k2, lens.k3, lens.p1, lens.p2) = std::tie(k1, k2, k3, p1, p2);
     // Rounding to whole grey values scatters a centroid by 0.004 px: the mean of 4 poses. 0.003 px are the photo's own
     // interpolation, which makes the spots wider and lean more.
     std::vector<Eigen::Vector2d> mean(spots.size(), Eigen::Vector2d::Zero());
@@ -96,7 +100,8 @@ TEST(Panorama, PutsSpotsWhereTheLensDoes) {
         mean[i] += error / 4.0;
       }
     }
-    for (const Eigen::Vector2d& each : mean) EXPECT_LT(each.norm(), 0.01) << each.transpose() << " k1 " << k1;
+    for (const Eigen::Vector2d& each : mean)
+      EXPECT_LT(each.norm(), 0.01) << each.transpose() << " k1 " << k1 << " k2 " << k2 << " p1 " << p1;
   }
 }
 
@@ -166,6 +171,21 @@ TEST(PanoramaFrame, RowsOfARollingShutterAreOfTheirTimes) {
     if (v != 110)
       EXPECT_GT(shift_between(frame(0.0, 0.0), rolling, strip).norm(), 0.5) << v;  // 3 px; beyond its slopes
   }
+}
+
+/// A camera's clock that is fast by two in a hundred is 10 ms ahead after half a second.
+TEST(PanoramaFrame, AFastClockIsADelayThatGrows) {
+  FarWorld world = FarWorld::of_noise(3.0 / 300.0, 9);
+  RotationScene scene;
+  scene.width_px = width, scene.height_px = height;
+  scene.intrinsics = [](double) { return camera; };
+  scene.motion = [](double t_s) { return Eigen::Vector3d(0.5 * t_s, 0.1 * t_s, 0.0); };
+  const auto frame = [&](double clock_rate, double delay_s) {
+    scene.clock_rate = clock_rate, scene.delay_s = delay_s;
+    return render_panorama_frame(world, scene, 15, 30.0, {.noise = 0.0}, 1);
+  };
+  EXPECT_LT(cv::norm(frame(0.02, 0.0), frame(0.0, 0.01), cv::NORM_INF), 2.0);
+  EXPECT_GT(shift_between(frame(0.0, 0.0), frame(0.02, 0.0), {20, 20, width - 40, height - 40}).norm(), 0.5);
 }
 
 /// Of a camera at rest, what differs after two seconds is on things that move.

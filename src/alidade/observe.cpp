@@ -58,7 +58,8 @@ ObserveReport judged_observation(ObserveSolution solution, RotationLog log, cons
   solution.residuals = reference_residuals(log, solution);
   solution.tested_causes = tested_causes_of(solution.causes);
   const StatedCovariance& stated = solution.stated;
-  solution.shared_errors = {stated.blocks.design_effect, stated.correlation_s, stated.block_s, stated.track_effect};
+  solution.shared_errors = {stated.blocks.design_effect, stated.correlation_s, stated.block_s, stated.track_effect,
+                            solution.jitter.noise_rad()};
   solution.log = std::move(log);
   return std::move(static_cast<ObserveReport&>(solution));
 }

@@ -388,6 +388,7 @@ HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream, const He
       Session(head, stream, config, progress, result).run();
     }
   }
+  heed_noise_of_readings(result);
   result.offline = offline_words(result);
   result.verdict = calibration_verdict(result, config, span);
   return result;

@@ -40,10 +40,11 @@ struct HeadCalibration {
   double head_time_s = 0.0;
   double sigma_clock_s =
       0.0;  ///< Of the head's times against the frames'; in σ of the delay beside what the log determines.
-  bool is_of_shots = false;          ///< Single images while the head stood; else of a video.
-  double narrow_focal_px = 0.0;      ///< Above zero: the field is so narrow that only one focal length is determined.
-  std::string fault;                 ///< What broke on the way; the head was stopped, and the rest is of before.
-  std::string log_csv;               ///< What `offline` reads, as log.csv.
+  double sigma_angle_rad = 0.0;  ///< Noise of the readings (rounding, too) that is estimated with the rest; 0: none.
+  bool is_of_shots = false;      ///< Single images while the head stood; else of a video.
+  double narrow_focal_px = 0.0;  ///< Above zero: the field is so narrow that only one focal length is determined.
+  std::string fault;             ///< What broke on the way; the head was stopped, and the rest is of before.
+  std::string log_csv;           ///< What `offline` reads, as log.csv.
   std::vector<std::string> offline;  ///< `alidade` with these words, in the folder of log.csv, gives the same numbers.
   ObserveReport report;
   Verdict verdict;

@@ -66,6 +66,8 @@ TEST(HeadCalibrate, LensMountingAndDelayWithinThreeSigma) {
   config.method = ObserveMethod::batch;
   config.width_px = 320;
   config.height_px = 240;
+  if (result.sigma_angle_rad > 0.0)
+    config.rotation = RotationKnowledge::noisy, config.sigma_angle_rad = result.sigma_angle_rad;
   const ObserveReport again = observe(parse_rotation_log(result.log_csv, "log.csv").log, config);
   ASSERT_EQ(again.quantities.size(), result.report.quantities.size());
   for (std::size_t i = 0; i < again.quantities.size(); ++i)

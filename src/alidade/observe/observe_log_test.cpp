@@ -111,6 +111,65 @@ TEST(ObserveLog, NoisyRotationIsEstimatedWithTheRest) {
   EXPECT_GE(static_cast<double>(inside) / counted, 0.954 - 3.0 * std::sqrt(0.954 * 0.046 / counted));
 }
 
+/// All rows of a long log count: σ falls with the root of their number, and covers.
+TEST(ObserveLog, NoisyRotationsOfALongLogAllCount) {
+  int inside = 0, counted = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    RotationScene scene = scene_of(seed);
+    scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
+    RotationLogConfig log_config;
+    log_config.source = RotationSource::head;
+    log_config.rate_hz = 25.0;
+    log_config.duration_s = 60.0;
+    log_config.sigma_angle_rad = 5e-4;
+    RotationLog log = simulate_rotation(scene, log_config, seed);
+    ObserveSetup config = config_of();
+    config.rotation = RotationKnowledge::noisy;
+    config.sigma_angle_rad = 5e-4;
+    const ObserveSolution report = solve_intrinsics(log, config);
+    ASSERT_EQ(report.status, ObserveSolution::Status::ok);
+    const Eigen::Vector4d errors = errors_of(report);
+    for (int i = 0; i < 4; ++i, ++counted)
+      inside += std::abs(errors[i]) < 2.0 * report.quantities[static_cast<std::size_t>(i)].sigma;
+    const double sigma = report.quantities[0].sigma_model;
+    log.rows.resize(240);
+    log.truth.resize(240);
+    const ObserveSolution first = solve_intrinsics(log, config);
+    EXPECT_LT(sigma, 1.25 * std::sqrt(240.0 / 1501.0) * first.quantities[0].sigma_model) << "seed " << seed;
+  }
+  EXPECT_GE(static_cast<double>(inside) / counted, 0.954 - 3.0 * std::sqrt(0.954 * 0.046 / counted));
+}
+
+/// A head's angles are read more often than there are frames: rows without pixels are no frames to adjust.
+TEST(ObserveLog, NoisyRotationsBetweenFramesAreNoFrames) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    RotationScene scene = scene_of(seed);
+    scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
+    scene.delay_s = -0.04;
+    scene.mount_rad = {0.035, -0.017, 0.017};
+    RotationLogConfig log_config;
+    log_config.source = RotationSource::head;
+    log_config.rate_hz = 30.0;
+    log_config.duration_s = 60.0;
+    log_config.sigma_angle_rad = 5e-5;
+    RotationLog log = simulate_rotation(scene, log_config, seed);
+    for (std::size_t k = 0; k < log.rows.size(); ++k) {
+      if (k % 3 != 2) std::ranges::fill(log.rows[k].px, Eigen::Vector2d::Constant(not_seen));
+    }
+    ObserveSetup config = config_of();
+    config.rotation = RotationKnowledge::noisy;
+    config.sigma_angle_rad = 5e-5;
+    config.estimate = {"k1", "mount", "delay"};
+    config.nuisances.k1 = config.nuisances.mount = config.nuisances.delay = true;
+    const ObserveSolution report = solve_intrinsics(log, config);
+    ASSERT_EQ(report.status, ObserveSolution::Status::ok) << "seed " << seed;
+    EXPECT_EQ(report.reference.bundle.frames.size(), 600u);
+    const Eigen::Vector4d errors = errors_of(report);
+    for (int i = 0; i < 4; ++i)
+      EXPECT_LT(std::abs(errors[i]), 4.0 * report.quantities[static_cast<std::size_t>(i)].sigma) << "seed " << seed;
+  }
+}
+
 /// Rates were lost for a second: the rotation across it is not known, the points are met again, the estimate goes on.
 TEST(ObserveLog, AGapOfTheRatesBeginsASegmentAndNothingBreaks) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {

@@ -284,5 +284,40 @@ TEST(ObserveSigma, NoCauseIsSilent) {
   }
 }
 
+/// The same beside encoders' noise that is estimated with the rest, as the check *rotation's noise* advises.
+TEST(ObserveSigma, NoCauseIsSilentBesideNoisyRotations) {
+  constexpr double sigma_rad = 3e-4;
+  ObserveSetup config = config_of();
+  config.rotation = RotationKnowledge::noisy;
+  config.sigma_angle_rad = sigma_rad;
+  std::vector<Cause> with_none = causes();
+  with_none.push_back({.name = "none"});
+  const int sets = testing::trials(2);
+  for (const Cause& cause : with_none) {
+    int silent = 0, good = 0;
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(sets); ++seed) {
+      Scenario scenario;
+      scenario.num_points = 10;
+      scenario.scene = cause.scene;
+      scenario.disturb = [&](RotationLog& log, Draws& draws) {
+        cause.disturb(log, draws);
+        for (RotationRow& row : log.rows) row.pan_tilt_roll_rad.head<2>() += sigma_rad * draws.normal2();
+      };
+      RotationLog log = log_of(scenario, seed);
+      if (std::string(cause.name) != "none") log.sigma_scale = log.sigma_parallax = std::nullopt;
+      const ObserveSolution report = solve_intrinsics(log, config);
+      const Verdict verdict = observe_verdict(report, log, config);
+      if (report.status != ObserveSolution::Status::ok) continue;
+      const double worst = z_of(report).cwiseAbs().maxCoeff();
+      good += verdict.state == State::good;
+      silent += verdict.state == State::good && worst > 5.0;
+      if (std::getenv("ALIDADE_SHOW"))
+        std::printf("%s %d: %.1fσ %s\n", cause.name, static_cast<int>(seed), worst, verdict.sentence.c_str());
+    }
+    EXPECT_EQ(silent, 0) << cause.name;
+    if (std::string(cause.name) == "none") EXPECT_GE(good, sets - sets / 10);
+  }
+}
+
 }  // namespace sigma_of_observe
 }  // namespace alidade

@@ -61,6 +61,8 @@ struct SharedErrors {
   double design_effect = 1.0;                 ///< Variance between blocks of time (photos) over the model's.
   double correlation_s = 0.0, block_s = 0.0;  ///< How long errors of a track last; length of a block.
   double track_effect = 1.0;                  ///< Variance of the tracks' scores over what lasts in them.
+  double rotation_rad = 0.0;  ///< σ of what the pixels of a frame have in common, as of its rotation; 0: no more than
+                              ///< by chance.
 };
 
 /// What became of a photo of a camera that rotated on the spot.

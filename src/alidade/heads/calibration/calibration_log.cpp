@@ -23,6 +23,10 @@ ObserveConfig offline_config(const HeadCalibration& result) {
   if (!config.square_pixels) config.estimate.emplace_back("k1");
   config.estimate.emplace_back("mount");
   if (!result.is_of_shots) config.estimate.emplace_back("delay");  // what stands shows none
+  if (result.sigma_angle_rad > 0.0) {
+    config.rotation = RotationKnowledge::noisy;
+    config.sigma_angle_rad = result.sigma_angle_rad;
+  }
   if (const double f = result.narrow_focal_px; f > 0.0)
     config.start = Eigen::Vector4d(f, f, 0.5 * (result.width_px - 1), 0.5 * (result.height_px - 1));
   return config;
@@ -48,6 +52,18 @@ ObserveReport observed(const HeadCalibration& result) {
   }
 }
 
+void heed_noise_of_readings(HeadCalibration& result) {
+  const double noise_rad = result.report.shared_errors.rotation_rad;
+  if (result.is_of_shots || !(noise_rad > 0.0)) return;
+  result.sigma_angle_rad = noise_rad;
+  ObserveReport report = observed(result);
+  const bool is_answer = report.status == ObserveReport::Status::ok;
+  if (is_answer && report.quantities.front().sigma <= result.report.quantities.front().sigma)
+    result.report = std::move(report);
+  else
+    result.sigma_angle_rad = 0.0;
+}
+
 std::vector<std::string> offline_words(const HeadCalibration& result) {
   const ObserveConfig config = offline_config(result);
   std::vector<std::string> words{"observe",    "log.csv",
@@ -55,6 +71,8 @@ std::vector<std::string> offline_words(const HeadCalibration& result) {
                                  "--estimate", fmt::format("{}", fmt::join(config.estimate, ",")),
                                  "--no-zoom",  "--method",
                                  "batch"};
+  if (config.sigma_angle_rad)
+    words.insert(words.end(), {"--rotation", "noisy", "--sigma-angle", fmt::format("{}", *config.sigma_angle_rad)});
   if (config.square_pixels) words.insert(words.end(), {"--square-pixels", "--fix-centre"});
   if (config.start)
     words.insert(words.end(), {"--start", fmt::format("{},{},{},{}", (*config.start)[0], (*config.start)[1],

@@ -13,5 +13,8 @@ namespace alidade {
 /// What `alidade` with the words of `offline` says of result.log_csv, down to the last digit: it is read back from its
 /// text.
 [[nodiscard]] ObserveReport observed(const HeadCalibration& result);
+/// Where the pixels of a frame err together, as if its rotation were read with noise (a head that rounds): estimated
+/// with the rest, once more.
+void heed_noise_of_readings(HeadCalibration& result);
 
 }  // namespace alidade

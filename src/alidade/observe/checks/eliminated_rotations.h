@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "alidade/observe/frame_buffer.h"
+#include "alidade/observe/solve/bundle_normal.h"
 
 namespace alidade {
 
@@ -28,19 +29,10 @@ class EliminatedRotations {
   [[nodiscard]] bool is_absorbed(Eigen::Index column, double information) const;
 
  private:
-  struct PointSums {
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-    Eigen::MatrixXd by_columns;                             ///< 3 × columns
-    std::vector<std::pair<int, Eigen::Matrix3d>> by_frame;  ///< point × rotation
-  };
-
-  void eliminate(const PointSums& point, const Eigen::Matrix3d& inverse);
-  void add_priors();
-
   const BundleSolution& solution_;
-  std::vector<PointSums> points_;
-  Eigen::MatrixXd rotations_, cross_;  ///< Information of the rotations; rotations × columns.
-  Eigen::VectorXd alone_;              ///< Information of each column if nothing followed it.
+  BundleNormal normal_;    ///< Of the columns but for their own information, which is not needed.
+  BundleSlopes slopes_;    ///< How points and rotations follow the columns.
+  Eigen::VectorXd alone_;  ///< Information of each column if nothing followed it.
 };
 
 /// Each frame's rotation was estimated.

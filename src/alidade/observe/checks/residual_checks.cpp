@@ -131,16 +131,44 @@ Check lasting_check(const ObserveSolution& report) {
 
 /// Do the residuals of a frame rotate together? An encoder's or a gyroscope's noise, which every row has again.
 Check jitter_check(const ObserveSolution& report) {
-  constexpr double more_than_pixels = 3.0;
   const RotationJitter& jitter = report.jitter;
-  const double sigma_rad = std::sqrt(jitter.variance_rad2);
-  Check check{"rotation's noise", State::good,      "frames do not jitter beyond their pixels' noise",
-              jitter.f_ratio,     more_than_pixels, "",
+  const double sigma_rad = jitter.noise_rad();
+  Check check{"rotation's noise",
+              State::good,
+              "frames do not jitter beyond their pixels' noise",
+              jitter.f_ratio,
+              RotationJitter::more_than_pixels,
+              "",
               "residuals"};
-  if (jitter.f_ratio > more_than_pixels && jitter.is_noise()) {
+  if (sigma_rad > 0.0) {
     check.state = State::care;
     check.text = "the pixels of a frame err together, as if its rotation were off by " +
                  text_of(sigma_rad / degree, 2) + "°: --rotation noisy --sigma-angle " + text_of(sigma_rad, 2);
+  }
+  return check;
+}
+
+/// Are the estimated rotations as far from the measured ones as their σ says? Each by what its pixels add to it.
+std::optional<Check> turn_noise_check(const BundleSolution& solution) {
+  constexpr double max_ratio = 1.3, chance = 5.0;
+  double squares = 0.0, expected = 0.0, sum_sigma = 0.0;
+  for (std::size_t k = 0; k < solution.rotation_information.size(); ++k) {
+    const double known = solution.rotation_information[k], seen = solution.rotation_information_seen[k];
+    if (!(known > 0.0) || solution.rotations_walk) return std::nullopt;
+    squares += solution.rotation_errors[k].squaredNorm() * known;
+    expected += 3.0 * seen / (seen + known);
+    sum_sigma += 1.0 / std::sqrt(known);
+  }
+  if (!(expected > 0.0)) return std::nullopt;
+  const double ratio = std::sqrt(squares / expected);
+  const double sigma_rad = sum_sigma / static_cast<double>(solution.rotation_information.size());
+  const double limit = std::max(max_ratio, std::sqrt(1.0 + chance * std::sqrt(2.0 / expected)));
+  Check check{"rotation's noise", State::good, "", ratio, limit, "", "residuals"};
+  check.text =
+      "the rotations err by " + text_of(ratio, 2) + " times their σ of " + text_of(sigma_rad / degree, 2) + "°";
+  if (ratio > limit) {
+    check.state = State::care;
+    check.text += ": --sigma-angle " + text_of(ratio * sigma_rad, 2) + ", or what is wrong with them is not noise";
   }
   return check;
 }
@@ -216,6 +244,7 @@ std::vector<Check> residual_checks(const ObserveSolution& report) {
   }
   checks.push_back(noise_check(report));
   if (report.jitter.f_ratio > 0.0) checks.push_back(jitter_check(report));
+  if (const auto noise = turn_noise_check(report.reference.solution)) checks.push_back(*noise);
   checks.push_back(rejected_check(report));
   if (!report.reference.bundle_point_of.empty() && !report.causes.empty()) checks.push_back(points_check(report));
   if (report.from_reference > 0.0) checks.push_back(reference_check(report));

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "alidade/observe/frame_buffer.h"
 
 namespace alidade {
@@ -23,7 +25,13 @@ struct RotationJitter {
   double variance_rad2 = 0.0;  ///< Of a rotation about an axis across the view, beyond chance.
   double lasts = 0.0;          ///< Correlation from frame to frame: 0 for noise, larger for model errors.
 
+  static constexpr double more_than_pixels = 3.0;  ///< Of f_ratio.
+
   [[nodiscard]] bool is_noise() const { return lasts < 0.5; }
+  /// σ of the rotations' noise; 0: no more than the pixels' own would be taken for.
+  [[nodiscard]] double noise_rad() const {
+    return f_ratio > more_than_pixels && is_noise() ? std::sqrt(variance_rad2) : 0.0;
+  }
 };
 
 /// From the mean residual of each frame that sees four points or more: a small rotation across the view moves all

@@ -1,37 +1,22 @@
 #include "alidade/observe/solve/rotation_bundle.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
+#include "alidade/observe/solve/bundle_normal.h"
 
 namespace alidade {
 namespace {
 
 constexpr double inverse_depth_information = 1.0;  // a point is 1 m away or farther: σ 1/m
 
-using PointByCommon = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
-
 /// The state of a bundle in its search: everything that is estimated.
 struct AdjustedState {
   RotatingCamera camera;
   std::vector<BearingPoint> points;
   std::vector<Eigen::Vector3d> rotation_errors;  ///< One per frame, or none.
-};
-
-struct PointFrameBlock {
-  int frame = 0;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< point × rotation error
-};
-
-struct PointBlock {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  PointByCommon by_common;
-  std::vector<PointFrameBlock> by_frame;
 };
 
 class Solver {
@@ -41,7 +26,9 @@ class Solver {
     num_rotations_ = config.nuisances.rotation ? static_cast<int>(bundle.frames.size()) : 0;
     state_ = {bundle.camera, bundle.points,
               std::vector<Eigen::Vector3d>(bundle.frames.size(), Eigen::Vector3d::Zero())};
-    blocks_.resize(bundle.points.size());
+    normal_.points.resize(bundle.points.size());
+    normal_.frames.resize(static_cast<std::size_t>(num_rotations_));
+    normal_.frames_are_measured = !is_random_walk() && std::isfinite(config.sigma_rotation_rad);
   }
 
   BundleSolution solve(const Progress& progress) {
@@ -162,11 +149,16 @@ class Solver {
   /// Normal equations at that state, prior included.
   void linearise() {
     const int n = layout_.size;
-    common_.setZero(n + 3 * num_rotations_, n + 3 * num_rotations_);
-    gradient_.setZero(n + 3 * num_rotations_);
-    common_.topLeftCorner(n, n) = prior_.information(layout_);
-    gradient_.head(n) = prior_.information(layout_) * prior_.offset(layout_, state_.camera);
-    for (std::size_t i = 0; i < blocks_.size(); ++i) begin_point(i);
+    normal_.common = prior_.information(layout_);
+    normal_.gradient = prior_.information(layout_) * prior_.offset(layout_, state_.camera);
+    for (std::size_t i = 0; i < normal_.points.size(); ++i) begin_point(i);
+    for (NormalBlock& frame : normal_.frames) {
+      frame.information.setZero();
+      frame.gradient.setZero();
+      frame.by_common.setZero(3, n);
+    }
+    normal_.crossings.clear();
+    normal_.walk.clear();
     residual_px_.clear();
     residuals_.clear();
     sum_squares_ = 0.0;
@@ -181,11 +173,10 @@ class Solver {
   }
 
   void begin_point(std::size_t i) {
-    PointBlock& block = blocks_[i];
+    NormalBlock& block = normal_.points[i];
     block.information.setZero();
     block.gradient.setZero();
     block.by_common.setZero(3, layout_.size);
-    block.by_frame.clear();
     if (config_.with_depth) {
       block.information(2, 2) = inverse_depth_information;
       block.gradient[2] =
@@ -197,16 +188,17 @@ class Solver {
 
   void add_rotation_prior(int k) {
     const double information = rotation_information(k);
-    const int at = layout_.size + 3 * k;
-    common_.diagonal().segment<3>(at).array() += information;
+    NormalBlock& frame = normal_.frames[static_cast<std::size_t>(k)];
     const Eigen::Vector3d before = is_random_walk() ? rotation_error(state_, k - 1) : Eigen::Vector3d::Zero();
     const Eigen::Vector3d pull = information * (rotation_error(state_, k) - before);
-    gradient_.segment<3>(at) += pull;
-    if (!is_random_walk() || k == 0) return;
-    common_.diagonal().segment<3>(at - 3).array() += information;
-    common_.block<3, 3>(at, at - 3).diagonal().array() -= information;
-    common_.block<3, 3>(at - 3, at).diagonal().array() -= information;
-    gradient_.segment<3>(at - 3) -= pull;
+    frame.information.diagonal().array() += information;
+    frame.gradient += pull;
+    if (!is_random_walk()) return;
+    normal_.walk.push_back(information);
+    if (k == 0) return;
+    NormalBlock& last = normal_.frames[static_cast<std::size_t>(k - 1)];
+    last.information.diagonal().array() += information;
+    last.gradient -= pull;
   }
 
   void add_observation(const RotationView& view, const BundleObservation& seen) {
@@ -222,29 +214,25 @@ class Solver {
     residuals_.push_back(error);
     const double weight = huber_weight(error.norm() / config_.sigma_px) / square(config_.sigma_px);
     sum_squares_ += weight * error.squaredNorm();
-    const int n = layout_.size;
-    const PixelByCommon by_common = p.J_px_common.leftCols(n);
+    const PixelByCommon by_common = p.J_px_common.leftCols(layout_.size);
     if (!config_.with_depth) p.J_px_point.col(2).setZero();
-    PointBlock& block = blocks_[static_cast<std::size_t>(seen.point)];
-    common_.topLeftCorner(n, n).noalias() += weight * by_common.transpose() * by_common;
-    gradient_.head(n).noalias() += weight * by_common.transpose() * error;
+    NormalBlock& block = normal_.points[static_cast<std::size_t>(seen.point)];
+    normal_.common.noalias() += weight * by_common.transpose() * by_common;
+    normal_.gradient.noalias() += weight * by_common.transpose() * error;
     block.information.noalias() += weight * p.J_px_point.transpose() * p.J_px_point;
     block.gradient.noalias() += weight * p.J_px_point.transpose() * error;
     block.by_common.noalias() += weight * p.J_px_point.transpose() * by_common;
     if (num_rotations_ > 0)
-      add_rotation(seen, p.J_px_common.middleCols<3>(rotation_layout_.rotation), by_common, error, weight, block);
+      add_rotation(seen, p.J_px_common.middleCols<3>(rotation_layout_.rotation), by_common, error, weight);
   }
 
   void add_rotation(const BundleObservation& seen, const Eigen::Matrix<double, 2, 3>& by_rotation,
-                    const PixelByCommon& by_common, const Eigen::Vector2d& error, double weight, PointBlock& block) {
-    const int at = layout_.size + 3 * seen.frame;
-    common_.block<3, 3>(at, at).noalias() += weight * by_rotation.transpose() * by_rotation;
-    common_.block(0, at, layout_.size, 3).noalias() += weight * by_common.transpose() * by_rotation;
-    common_.block(at, 0, 3, layout_.size) = common_.block(0, at, layout_.size, 3).transpose();
-    gradient_.segment<3>(at).noalias() += weight * by_rotation.transpose() * error;
-    PointFrameBlock by_frame{seen.frame};
-    by_frame.information.noalias() = weight * prediction_.J_px_point.transpose() * by_rotation;
-    block.by_frame.push_back(by_frame);
+                    const PixelByCommon& by_common, const Eigen::Vector2d& error, double weight) {
+    NormalBlock& frame = normal_.frames[static_cast<std::size_t>(seen.frame)];
+    frame.information.noalias() += weight * by_rotation.transpose() * by_rotation;
+    frame.by_common.noalias() += weight * by_rotation.transpose() * by_common;
+    frame.gradient.noalias() += weight * by_rotation.transpose() * error;
+    normal_.crossings.push_back({seen.point, seen.frame, weight * prediction_.J_px_point.transpose() * by_rotation});
   }
 
   void add_range(const BundleRange& range) {
@@ -253,7 +241,7 @@ class Solver {
     const RotationFrame frame = frame_at(state_, range.frame);
     const RotationView view(state_.camera, frame);
     const Eigen::Vector3d d = view.point_in_cam(point);
-    PointByCommon J_common(3, layout_.size);
+    PointByCommonSlope J_common(3, layout_.size);
     Eigen::Matrix3d J_point;
     view.point_jacobians(point, layout_, J_common, J_point);
     const double chi = point.inverse_depth;
@@ -262,63 +250,27 @@ class Solver {
     Eigen::Vector3d by_point = (J_d * J_point).transpose();
     by_point[2] -= d.norm() / (chi * chi * config_.sigma_range_m);
     const double weight = huber_weight(std::abs(residual));
-    const int n = layout_.size;
-    PointBlock& block = blocks_[static_cast<std::size_t>(range.point)];
-    common_.topLeftCorner(n, n).noalias() += weight * by_common * by_common.transpose();
-    gradient_.head(n).noalias() += weight * residual * by_common;
+    NormalBlock& block = normal_.points[static_cast<std::size_t>(range.point)];
+    normal_.common.noalias() += weight * by_common * by_common.transpose();
+    normal_.gradient.noalias() += weight * residual * by_common;
     block.information.noalias() += weight * by_point * by_point.transpose();
     block.gradient.noalias() += weight * residual * by_point;
     block.by_common.noalias() += weight * by_point * by_common.transpose();
     sum_squares_ += weight * residual * residual;
   }
 
-  /// Eliminates the points from `reduced` and `gradient`: S = C − Σ Bᵀ P⁻¹ B.
-  void eliminate_points(double damping, Eigen::MatrixXd& reduced, Eigen::VectorXd& gradient) {
-    inverse_.resize(blocks_.size());
-    const int n = layout_.size;
-    for (std::size_t i = 0; i < blocks_.size(); ++i) {
-      const PointBlock& block = blocks_[i];
-      Eigen::Matrix3d information = block.information;
-      information.diagonal() *= 1.0 + damping;
-      information.diagonal().array() += 1e-9;  // a point that no observation binds stays where it is
-      inverse_[i] = information.inverse();
-      const PointByCommon gain = inverse_[i] * block.by_common;
-      reduced.topLeftCorner(n, n).noalias() -= block.by_common.transpose() * gain;
-      gradient.head(n).noalias() -= gain.transpose() * block.gradient;
-      for (const PointFrameBlock& a : block.by_frame) {
-        const int at = n + 3 * a.frame;
-        const Eigen::Matrix3d a_gain = a.information.transpose() * inverse_[i];
-        reduced.block(at, 0, 3, n).noalias() -= a_gain * block.by_common;
-        gradient.segment<3>(at).noalias() -= a_gain * block.gradient;
-        for (const PointFrameBlock& b : block.by_frame) {
-          if (b.frame <= a.frame) reduced.block<3, 3>(at, n + 3 * b.frame).noalias() -= a_gain * b.information;
-        }
-      }
-    }
-  }
-
-  [[nodiscard]] AdjustedState stepped(double damping) {
-    Eigen::MatrixXd reduced = common_;
-    Eigen::VectorXd gradient = gradient_;
-    reduced.diagonal() *= 1.0 + damping;
-    eliminate_points(damping, reduced, gradient);
-    const Eigen::VectorXd step = -solve_symmetric(reduced, gradient);
+  [[nodiscard]] AdjustedState stepped(double damping) const {
+    const BundleStep step = bundle_step(normal_, damping);
     AdjustedState next = state_;
-    const int n = layout_.size;
-    if (!step.allFinite()) return next;
-    next.camera = state_.camera.retract(layout_, CommonVector(step.head(n)));
-    for (int k = 0; k < num_rotations_; ++k) {
-      Eigen::Vector3d& at = next.rotation_errors[static_cast<std::size_t>(k)];
-      at = log_so3((exp_so3(step.segment<3>(n + 3 * k)) * exp_so3(at)).normalized());
+    if (!step.common.allFinite()) return next;
+    next.camera = state_.camera.retract(layout_, CommonVector(step.common));
+    for (std::size_t k = 0; k < step.frames.size(); ++k) {
+      Eigen::Vector3d& at = next.rotation_errors[k];
+      at = log_so3((exp_so3(step.frames[k]) * exp_so3(at)).normalized());
     }
-    for (std::size_t i = 0; i < blocks_.size(); ++i) {
-      Eigen::Vector3d right = blocks_[i].gradient + blocks_[i].by_common * step.head(n);
-      for (const PointFrameBlock& seen : blocks_[i].by_frame) {
-        right += seen.information * step.segment<3>(n + 3 * seen.frame);
-      }
-      const Eigen::Vector3d move = -inverse_[i] * right;
-      next.points[i].ab += move.head<2>();
-      if (config_.with_depth) next.points[i].inverse_depth += move.z();
+    for (std::size_t i = 0; i < step.points.size(); ++i) {
+      next.points[i].ab += step.points[i].head<2>();
+      if (config_.with_depth) next.points[i].inverse_depth += step.points[i].z();
     }
     return next;
   }
@@ -330,24 +282,21 @@ class Solver {
     for (int k = 0; k < static_cast<int>(bundle_.frames.size()); ++k) {
       solution.mount_from_start.push_back(frame_at(state_, k).cam_from_start);
     }
-    Eigen::MatrixXd reduced = common_;
-    Eigen::VectorXd gradient = gradient_;
     solution.prior_information = prior_.information(layout_);
     solution.prior_gradient = solution.prior_information * prior_.offset(layout_, state_.camera);
     solution.given_information = prior_.given_information(layout_);
-    reduced.topLeftCorner(n, n) -= solution.prior_information;
-    eliminate_points(0.0, reduced, gradient);
-    if (num_rotations_ > 0) {
-      const auto turns = reduced.bottomRightCorner(3 * num_rotations_, 3 * num_rotations_);
-      const Eigen::MatrixXd by_common = reduced.bottomLeftCorner(3 * num_rotations_, n);
-      reduced.topLeftCorner(n, n).noalias() -= by_common.transpose() * Ldlt(turns).solve_each(by_common);
+    solution.information = common_information(normal_, solution.prior_information);
+    for (std::size_t i = 0; i < normal_.points.size() && num_rotations_ == 0; ++i) {
+      const Eigen::Matrix3d inverse = inverse_of_point(normal_.points[i], 0.0);
+      solution.given_common.push_back({-inverse * normal_.points[i].by_common, inverse});
     }
-    solution.information = reduced.topLeftCorner(n, n);
     if (num_rotations_ > 0) solution.rotation_errors = state_.rotation_errors;
     solution.rotations_walk = is_random_walk();
-    for (int k = 0; k < num_rotations_; ++k) solution.rotation_information.push_back(rotation_information(k));
-    for (std::size_t i = 0; i < blocks_.size() && num_rotations_ == 0; ++i) {
-      solution.given_common.push_back({-inverse_[i] * blocks_[i].by_common, inverse_[i]});
+    for (int k = 0; k < num_rotations_; ++k) {
+      const double known = rotation_information(k);
+      solution.rotation_information.push_back(known);
+      const double all = normal_.frames[static_cast<std::size_t>(k)].information.trace() / 3.0;
+      solution.rotation_information_seen.push_back(std::max(all - known, 0.0));
     }
     solution.residual_px = residual_px_;
     solution.residuals = residuals_;
@@ -356,8 +305,9 @@ class Solver {
     for (const double norm : residual_px_) squares += norm * norm;
     const auto count = 2.0 * static_cast<double>(std::max<std::size_t>(residual_px_.size(), 1));
     solution.rms_px = std::sqrt(squares / count);
-    const auto is_seen_at_all = [](const PointBlock& block) { return block.information(0, 0) > 0.0; };
-    const auto num_points = static_cast<int>(std::count_if(blocks_.begin(), blocks_.end(), is_seen_at_all));
+    const auto is_seen_at_all = [](const NormalBlock& block) { return block.information(0, 0) > 0.0; };
+    const auto num_points =
+        static_cast<int>(std::count_if(normal_.points.begin(), normal_.points.end(), is_seen_at_all));
     const int unknowns = n + (config_.with_depth ? 3 : 2) * num_points +
                          (num_rotations_ > 0 && !is_random_walk() && !std::isfinite(config_.sigma_rotation_rad)
                               ? 3 * (num_rotations_ - 1)
@@ -372,10 +322,7 @@ class Solver {
   const CommonLayout rotation_layout_{with_turn(config_.nuisances)};
   int num_rotations_ = 0;  ///< Frames whose rotation is estimated.
   AdjustedState state_;
-  Eigen::MatrixXd common_;  ///< Shared parameters, then rotations.
-  Eigen::VectorXd gradient_;
-  std::vector<PointBlock> blocks_;
-  std::vector<Eigen::Matrix3d> inverse_;
+  BundleNormal normal_;
   std::vector<double> residual_px_;
   std::vector<Eigen::Vector2d> residuals_;
   double sum_squares_ = 0.0;

@@ -92,14 +92,15 @@ struct BundleSolution {
   CommonMatrix given_information;              ///< Of the prior, the part that the user gave.
   std::vector<PointGivenCommon> given_common;  ///< One per point; not where rotations are estimated.
   // Where each frame's rotation is estimated, one per frame:
-  std::vector<Eigen::Vector3d> rotation_errors;  ///< Of the measured rotation. [rad]
-  std::vector<double> rotation_information;      ///< 1/σ² of it, or of its step from the frame before.
-  bool rotations_walk = false;                   ///< The latter.
-  std::vector<Eigen::Vector2d> residuals;        ///< Prediction minus pixel, one per observation, normalised.
-  std::vector<double> residual_px;               ///< Their norms.
-  double sum_squares = 0.0;                      ///< Of weighted residuals over σ.
-  double rms_px = 0.0;                           ///< A coordinate, normalised, unweighted.
-  int dof = 0;                                   ///< Measurements minus unknowns.
+  std::vector<Eigen::Vector3d> rotation_errors;   ///< Of the measured rotation. [rad]
+  std::vector<double> rotation_information;       ///< 1/σ² of it, or of its step from the frame before.
+  std::vector<double> rotation_information_seen;  ///< What its own pixels add to that, the mean of three axes.
+  bool rotations_walk = false;                    ///< The latter.
+  std::vector<Eigen::Vector2d> residuals;         ///< Prediction minus pixel, one per observation, normalised.
+  std::vector<double> residual_px;                ///< Their norms.
+  double sum_squares = 0.0;                       ///< Of weighted residuals over σ.
+  double rms_px = 0.0;                            ///< A coordinate, normalised, unweighted.
+  int dof = 0;                                    ///< Measurements minus unknowns.
 
   [[nodiscard]] CommonMatrix covariance() const;
   /// Cramér–Rao bound at the solution: without the weak prior. Not finite where the data do not determine it.

@@ -9,6 +9,7 @@
 #include "alidade/observe/filters/flow_filter.h"
 #include "alidade/observe/filters/frame_variation.h"
 #include "alidade/observe/filters/hybrid.h"
+#include "alidade/observe/solve/reference_rows.h"
 #include "alidade/observe/solve/solve_once.h"
 #include "alidade/observe/solve/start_roll.h"
 
@@ -20,7 +21,6 @@ Eigen::Vector4d intrinsics_px(const Eigen::Vector4d& k, const PixelScale& scale)
   return {px[0], px[1], px[2] + scale.centre.x(), px[3] + scale.centre.y()};
 }
 
-constexpr std::size_t max_turns = 240;  // frames whose rotation is estimated: the solve is cubic in them
 constexpr std::size_t max_cells = 4000000;
 
 /// One run over one log: frames, scale and start made once, then a method, then the reference.
@@ -237,19 +237,25 @@ class Observation {
     report_.gramian_lambda_min = observer.gramian_lambda_min();
   }
 
+  [[nodiscard]] FrameBuffer reference_frames() const {
+    const std::vector<bool> is_used =
+        reference_rows(frames_, report_.reference_from_s, report_.reference_until_s, log_.num_points,
+                       estimated_rotations(config_.rotation, log_.source));
+    const auto rows = static_cast<std::size_t>(std::ranges::count(is_used, true));
+    const std::size_t room = std::max<std::size_t>(max_cells / std::max<std::size_t>(log_.num_points, 1), 64);
+    FrameBuffer buffer(log_.num_points, std::min(rows + 1, room));
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      if (is_used[k])
+        add_frame(buffer, k);
+      else if (!buffer.frames().empty() && frames_[k].starts_segment)
+        buffer.renew_all();
+    }
+    return buffer;
+  }
+
   /// All rows since the intrinsics last changed, together: the bound, and the answer of `batch`.
   void solve_reference() {
-    std::size_t rows = 0;
-    const auto is_at_rest = [&](const RotationFrame& frame) {
-      return frame.t_s >= report_.reference_from_s - 1e-9 && frame.t_s <= report_.reference_until_s + 1e-9;
-    };
-    for (const RotationFrame& frame : frames_) rows += is_at_rest(frame) ? 1u : 0u;
-    const bool turns = config_.rotation != RotationKnowledge::known;
-    const std::size_t room = std::max<std::size_t>(max_cells / std::max<std::size_t>(log_.num_points, 1), 64);
-    FrameBuffer buffer(log_.num_points, turns ? max_turns : std::min(rows + 1, room));
-    for (std::size_t k = 0; k < frames_.size(); ++k) {
-      if (is_at_rest(frames_[k])) add_frame(buffer, k);
-    }
+    const FrameBuffer buffer = reference_frames();
     AdjustConfig config = adjust_config_of(log_, config_, start_, report_.scale);
     if (has_final_ && config_.method != ObserveMethod::fang2011) {
       config.start = final_;

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/observe/config.h"
+#include "alidade/observe/rotation_frame.h"
+
+namespace alidade {
+
+enum class EstimatedRotations {
+  none,      ///< They are known.
+  free,      ///< Without a measurement, or walking from one to the next.
+  measured,  ///< Each has a measurement of its own.
+};
+
+[[nodiscard]] EstimatedRotations estimated_rotations(RotationKnowledge rotation, RotationSource source);
+
+/// Which rows are adjusted together: those from `from_s` to `until_s`; where rotations are estimated those of them that
+/// have pixels, and evenly spread ones where they are more than can be solved together.
+[[nodiscard]] std::vector<bool> reference_rows(std::span<const RotationFrame> frames, double from_s, double until_s,
+                                               std::size_t num_points, EstimatedRotations rotations);
+
+}  // namespace alidade

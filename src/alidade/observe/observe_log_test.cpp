@@ -170,6 +170,25 @@ TEST(ObserveLog, NoisyRotationsBetweenFramesAreNoFrames) {
   }
 }
 
+/// A rate about an axis that does not turn is its noise: to take the noise away is no scale of -1.
+TEST(ObserveLog, NoisyRatesHaveNoScaleOfTheirNoise) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    RotationScene scene = scene_of(seed);
+    scene.motion = [](double t_s) { return Eigen::Vector3d(paper_rate(t_s).x(), paper_rate(t_s).y(), 0.0); };
+    RotationLogConfig log_config;
+    log_config.duration_s = 20.0;
+    log_config.sigma_rate_rad_per_s = 0.003;
+    const RotationLog log = simulate_rotation(scene, log_config, seed);
+    ObserveSetup config = config_of();
+    config.rotation = RotationKnowledge::noisy;
+    config.sigma_rate_rad_per_s = 0.003;
+    const ObserveSolution report = solve_intrinsics(log, config);
+    ASSERT_EQ(report.status, ObserveSolution::Status::ok);
+    ASSERT_FALSE(report.causes.empty());
+    for (const CauseScore& cause : report.causes) EXPECT_LT(cause.z, 5.0) << cause.name << ", seed " << seed;
+  }
+}
+
 /// Rates were lost for a second: the rotation across it is not known, the points are met again, the estimate goes on.
 TEST(ObserveLog, AGapOfTheRatesBeginsASegmentAndNothingBreaks) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {

@@ -26,8 +26,36 @@ ObserveNuisances with_rotation(ObserveNuisances nuisances) {
   return nuisances;
 }
 
-std::vector<RotationError> errors_but(const RotationLog& log, const std::vector<std::string>& estimated) {
+/// σ² of the measured rates, where they are noisy; 0: they are not. [rad²/s²]
+double rate_variance(const Adjustment& reference) {
+  const BundleSolution& solution = reference.solution;
+  const auto& frames = reference.bundle.frames;
+  double sum = 0.0, count = 0.0;
+  for (std::size_t k = 1; solution.rotations_walk && k < solution.rotation_information.size(); ++k) {
+    const double seconds2 = frames[k].dt_s * (frames[k].t_s - frames[k - 1].t_s);
+    if (!(seconds2 > 0.0)) continue;
+    sum += 1.0 / (solution.rotation_information[k] * seconds2);
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+/// Whether a rate is measured with so much noise that its scale cannot be tested: that of the noise is −1, and that of
+/// both is off by their ratio (errors in variables).
+bool is_mostly_noise(const RotationLog& log, const RotationError& error, double variance) {
+  constexpr double max_share = 1e-3;  // of the mean square
+  if (error.cause != "scale of the rates" || variance == 0.0) return false;
+  const int axis = error.member.back() - 'x';
+  double squares = 0.0;
+  for (const RotationRow& row : log.rows) squares += row.rate_rad_per_s[axis] * row.rate_rad_per_s[axis];
+  return !(variance * static_cast<double>(log.rows.size()) < max_share * squares);
+}
+
+std::vector<RotationError> errors_but(const RotationLog& log, const Adjustment& reference,
+                                      const std::vector<std::string>& estimated) {
   std::vector<RotationError> errors = rotation_errors(log.source, log.has_roll_rate);
+  const double variance = rate_variance(reference);
+  std::erase_if(errors, [&](const RotationError& error) { return is_mostly_noise(log, error, variance); });
   std::erase_if(errors, [&](const RotationError& error) {
     return std::find(estimated.begin(), estimated.end(), error.cause) != estimated.end();
   });
@@ -41,7 +69,7 @@ CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, 
       base_(without_rotation(config.nuisances)),
       wide_(with_rotation(config.nuisances)),
       height_(config.height),
-      patterns_(turn_patterns(log, errors_but(log, config.errors), config.max_gap_s)),
+      patterns_(turn_patterns(log, errors_but(log, reference, config.errors), config.max_gap_s)),
       lever_column_(reference.bundle.points.size(), -1),
       across_column_(reference.bundle.points.size(), -1) {
   for (const RotationFrame& frame : reference.bundle.frames) {

@@ -59,11 +59,10 @@ Rigid3 cam_from_base(Head head, const Eigen::Vector2d& readings_rad) {
 
 /// The spline through the path of the start, at the work's times.
 void set_path(double scale, Placing& work) {
-  const MovingStart& start = work.start;
   const std::size_t reference = work.problem.reference;
+  const Rigid3& cam_from_start = work.start.cameras[reference].cam_from_world;
   std::vector<Eigen::Vector3d> path;
-  for (const Eigen::Vector3d& at : start.path)
-    path.emplace_back(scale * (start.cameras[reference].cam_from_world * at));
+  for (const Eigen::Vector3d& at : work.start.path) path.emplace_back(scale * (cam_from_start * at));
   // Knots counted from the reference's first observation: the same ones wherever the path is thought to begin.
   const double anchor_s = work.series[reference].t_s.front();
   const double before = std::floor((work.path_t_s.front() - anchor_s) / work.knot_s + 1e-6) - 1.0;
@@ -74,20 +73,18 @@ void set_path(double scale, Placing& work) {
 /// World and clock become those of the reference camera; lengths those of the distance given, if there is one.
 void set_state(Placing& work) {
   const MovingStart& start = work.start;
-  const std::size_t reference = work.problem.reference;
-  const MovingStart::Placed& first = start.cameras[reference];
+  const MovingStart::Placed& first = start.cameras[work.problem.reference];
   const double mid_s = 0.5 * (start.t_s.front() + start.t_s.back());
   const auto in_rig = [&](double t_s) { return t_s + first.offset_s + (first.rate - 1.0) * (t_s - mid_s); };
   work.state.offset_s.clear();
   work.state.drift.clear();
   work.path_t_s.clear();
-  double scale = 1.0;
   const Rigid3 world_from_first = first.cam_from_world.inverse();
   const auto centre = [&](std::size_t h) {
     return Eigen::Vector3d(first.cam_from_world * start.cameras[h].cam_from_world.inverse().translation);
   };
   const double start_m = (centre(work.problem.scale_first) - centre(work.problem.scale_second)).norm();
-  if (work.config.distance) scale = work.config.distance->distance_m / start_m;
+  const double scale = work.config.distance ? work.config.distance->distance_m / start_m : 1.0;
   work.problem.scale_m = scale * start_m;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     const MovingStart::Placed& camera = start.cameras[h];

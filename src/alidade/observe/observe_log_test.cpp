@@ -31,6 +31,25 @@ Eigen::Vector4d errors_of(const ObserveSolution& report) {
   return errors;
 }
 
+/// A head on the paper's course whose encoders have noise.
+RotationLog noisy_head_log(RotationScene scene, double rate_hz, double duration_s, double sigma_angle_rad,
+                           std::uint64_t seed) {
+  scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
+  RotationLogConfig config;
+  config.source = RotationSource::head;
+  config.rate_hz = rate_hz;
+  config.duration_s = duration_s;
+  config.sigma_angle_rad = sigma_angle_rad;
+  return simulate_rotation(scene, config, seed);
+}
+
+ObserveSetup noisy_head_config(double sigma_angle_rad) {
+  ObserveSetup config = config_of();
+  config.rotation = RotationKnowledge::noisy;
+  config.sigma_angle_rad = sigma_angle_rad;
+  return config;
+}
+
 /// What the filter ends at is compared with all rows together, also where nothing of the last row is seen or fits:
 /// there it once was not, and stood 9σ off.
 TEST(ObserveLog, TheEndOfALogIsComparedWithAllRowsWhateverItsLastRowIs) {
@@ -88,17 +107,8 @@ TEST(ObserveLog, AMeasuredVelocityTakesTheBiasOfTranslationAway) {
 TEST(ObserveLog, NoisyRotationIsEstimatedWithTheRest) {
   int inside = 0, counted = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    RotationScene scene = scene_of(seed);
-    scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
-    RotationLogConfig log_config;
-    log_config.source = RotationSource::head;
-    log_config.rate_hz = 15.0;
-    log_config.duration_s = 6.0;
-    log_config.sigma_angle_rad = 5e-4;
-    const RotationLog log = simulate_rotation(scene, log_config, seed);
-    ObserveSetup config = config_of();
-    config.rotation = RotationKnowledge::noisy;
-    config.sigma_angle_rad = 5e-4;
+    const RotationLog log = noisy_head_log(scene_of(seed), 15.0, 6.0, 5e-4, seed);
+    const ObserveSetup config = noisy_head_config(5e-4);
     const ObserveSolution report = solve_intrinsics(log, config);
     ASSERT_EQ(report.status, ObserveSolution::Status::ok);
     const Eigen::Vector4d errors = errors_of(report);
@@ -115,17 +125,8 @@ TEST(ObserveLog, NoisyRotationIsEstimatedWithTheRest) {
 TEST(ObserveLog, NoisyRotationsOfALongLogAllCount) {
   int inside = 0, counted = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    RotationScene scene = scene_of(seed);
-    scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
-    RotationLogConfig log_config;
-    log_config.source = RotationSource::head;
-    log_config.rate_hz = 25.0;
-    log_config.duration_s = 60.0;
-    log_config.sigma_angle_rad = 5e-4;
-    RotationLog log = simulate_rotation(scene, log_config, seed);
-    ObserveSetup config = config_of();
-    config.rotation = RotationKnowledge::noisy;
-    config.sigma_angle_rad = 5e-4;
+    RotationLog log = noisy_head_log(scene_of(seed), 25.0, 60.0, 5e-4, seed);
+    const ObserveSetup config = noisy_head_config(5e-4);
     const ObserveSolution report = solve_intrinsics(log, config);
     ASSERT_EQ(report.status, ObserveSolution::Status::ok);
     const Eigen::Vector4d errors = errors_of(report);
@@ -144,21 +145,13 @@ TEST(ObserveLog, NoisyRotationsOfALongLogAllCount) {
 TEST(ObserveLog, NoisyRotationsBetweenFramesAreNoFrames) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     RotationScene scene = scene_of(seed);
-    scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
     scene.delay_s = -0.04;
     scene.mount_rad = {0.035, -0.017, 0.017};
-    RotationLogConfig log_config;
-    log_config.source = RotationSource::head;
-    log_config.rate_hz = 30.0;
-    log_config.duration_s = 60.0;
-    log_config.sigma_angle_rad = 5e-5;
-    RotationLog log = simulate_rotation(scene, log_config, seed);
+    RotationLog log = noisy_head_log(scene, 30.0, 60.0, 5e-5, seed);
     for (std::size_t k = 0; k < log.rows.size(); ++k) {
       if (k % 3 != 2) std::ranges::fill(log.rows[k].px, Eigen::Vector2d::Constant(not_seen));
     }
-    ObserveSetup config = config_of();
-    config.rotation = RotationKnowledge::noisy;
-    config.sigma_angle_rad = 5e-5;
+    ObserveSetup config = noisy_head_config(5e-5);
     config.estimate = {"k1", "mount", "delay"};
     config.nuisances.k1 = config.nuisances.mount = config.nuisances.delay = true;
     const ObserveSolution report = solve_intrinsics(log, config);
@@ -167,6 +160,25 @@ TEST(ObserveLog, NoisyRotationsBetweenFramesAreNoFrames) {
     const Eigen::Vector4d errors = errors_of(report);
     for (int i = 0; i < 4; ++i)
       EXPECT_LT(std::abs(errors[i]), 4.0 * report.quantities[static_cast<std::size_t>(i)].sigma) << "seed " << seed;
+  }
+}
+
+/// What the check of the rotations' noise advises where the given σ is too small is the true one, at once.
+TEST(ObserveLog, NoiseOfRotationsIsAdvisedAsItIs) {
+  for (const double given_rad : {1e-4, 2e-4, 5e-4}) {
+    double ratio = 0.0;
+    constexpr int sets = 4;
+    for (std::uint64_t seed = 1; seed <= sets; ++seed) {
+      const RotationLog log = noisy_head_log(scene_of(seed), 15.0, 20.0, 5e-4, seed);
+      const ObserveSetup config = noisy_head_config(given_rad);
+      const ObserveSolution report = solve_intrinsics(log, config);
+      const Verdict verdict = observe_verdict(report, log, config);
+      const auto check = std::ranges::find(verdict.checks, "rotation's noise", &Check::name);
+      ASSERT_NE(check, verdict.checks.end());
+      EXPECT_EQ(check->state == State::good, given_rad > 4e-4) << given_rad;
+      ratio += check->value / sets;
+    }
+    EXPECT_NEAR(ratio * given_rad, 5e-4, 0.1 * 5e-4) << given_rad;
   }
 }
 

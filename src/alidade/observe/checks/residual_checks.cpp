@@ -148,21 +148,23 @@ Check jitter_check(const ObserveSolution& report) {
   return check;
 }
 
-/// Are the estimated rotations as far from the measured ones as their σ says? Each by what its pixels add to it.
+/// Are the estimated rotations as far from the measured ones as their σ says? Of an information Λ measured and F seen
+/// an error of σ is estimated as its share s = F/(F + Λ), beside s²/F of the pixels: σ² = Σ(ε² − s²/F) / Σs².
 std::optional<Check> turn_noise_check(const BundleSolution& solution) {
   constexpr double max_ratio = 1.3, chance = 5.0;
-  double squares = 0.0, expected = 0.0, sum_sigma = 0.0;
+  double squares = 0.0, weight = 0.0, sum_sigma = 0.0;
   for (std::size_t k = 0; k < solution.rotation_information.size(); ++k) {
     const double known = solution.rotation_information[k], seen = solution.rotation_information_seen[k];
     if (!(known > 0.0) || solution.rotations_walk) return std::nullopt;
-    squares += solution.rotation_errors[k].squaredNorm() * known;
-    expected += 3.0 * seen / (seen + known);
+    const double share = seen / (seen + known);
+    squares += solution.rotation_errors[k].squaredNorm() / 3.0 - share / (seen + known);
+    weight += share * share;
     sum_sigma += 1.0 / std::sqrt(known);
   }
-  if (!(expected > 0.0)) return std::nullopt;
-  const double ratio = std::sqrt(squares / expected);
+  if (!(weight > 0.0)) return std::nullopt;
   const double sigma_rad = sum_sigma / static_cast<double>(solution.rotation_information.size());
-  const double limit = std::max(max_ratio, std::sqrt(1.0 + chance * std::sqrt(2.0 / expected)));
+  const double ratio = std::sqrt(std::max(squares / weight, 0.0)) / sigma_rad;
+  const double limit = std::max(max_ratio, std::sqrt(1.0 + chance * std::sqrt(2.0 / (3.0 * weight))));
   Check check{"rotation's noise", State::good, "", ratio, limit, "", "residuals"};
   check.text =
       "the rotations err by " + text_of(ratio, 2) + " times their σ of " + text_of(sigma_rad / degree, 2) + "°";

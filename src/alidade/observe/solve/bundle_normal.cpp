@@ -5,6 +5,8 @@
 namespace alidade {
 namespace {
 
+constexpr double unbound = 1e-9;  // a point that no observation binds stays where it is
+
 Eigen::Matrix3d inverse_of_frame(const NormalBlock& frame, double damping) {
   Eigen::Matrix3d information = frame.information;
   information.diagonal() *= 1.0 + damping;
@@ -96,10 +98,9 @@ Reduced without_points(const BundleNormal& normal, double damping) {
 }
 
 Reduced without_frames(const BundleNormal& normal, double damping) {
-  constexpr double bound = 1e-9;  // a point that no observation binds stays where it is
   const Eigen::Index n = normal.common.rows();
   Reduced reduced = with_blocks(normal, normal.points, damping);
-  reduced.information.diagonal().tail(3 * std::ssize(normal.points)).array() += bound;
+  reduced.information.diagonal().tail(3 * std::ssize(normal.points)).array() += unbound;
   std::size_t next = 0;
   for (std::size_t k = 0; k < normal.frames.size(); ++k) {
     const Eigen::Matrix3d inverse = inverse_of_frame(normal.frames[k], damping);
@@ -114,11 +115,23 @@ bool eliminates_frames(const BundleNormal& normal) {
   return normal.frames_are_measured && normal.frames.size() > normal.points.size();
 }
 
-/// Steps of the blocks that were eliminated, by those of the rest.
-std::vector<Eigen::Vector3d> back_substituted(const std::vector<NormalBlock>& blocks, const Eigen::VectorXd& common) {
-  std::vector<Eigen::Vector3d> right;
-  for (const NormalBlock& block : blocks) right.emplace_back(block.gradient + block.by_common * common);
-  return right;
+/// Back-substitution: `gone` comes as what the shared parameters leave of the eliminated blocks' equations, 3 × any.
+template <typename Matrix>
+void follow_kept(const BundleNormal& normal, double damping, const std::vector<Matrix>& kept,
+                 std::vector<Matrix>& gone) {
+  const bool frames_go = eliminates_frames(normal);
+  for (const auto& [point, frame, information] : normal.crossings) {
+    const auto p = static_cast<std::size_t>(point), f = static_cast<std::size_t>(frame);
+    if (frames_go)
+      gone[f] += information.transpose() * kept[p];
+    else
+      gone[p] += information * kept[f];
+  }
+  for (std::size_t i = 0; i < gone.size(); ++i)
+    gone[i] =
+        (-(frames_go ? inverse_of_frame(normal.frames[i], damping) : inverse_of_point(normal.points[i], damping)) *
+         gone[i])
+            .eval();
 }
 
 std::vector<Eigen::Vector3d> in_threes(const Eigen::VectorXd& step, Eigen::Index from) {
@@ -132,7 +145,7 @@ std::vector<Eigen::Vector3d> in_threes(const Eigen::VectorXd& step, Eigen::Index
 Eigen::Matrix3d inverse_of_point(const NormalBlock& point, double damping) {
   Eigen::Matrix3d information = point.information;
   information.diagonal() *= 1.0 + damping;
-  information.diagonal().array() += 1e-9;  // a point that no observation binds stays where it is
+  information.diagonal().array() += unbound;
   return information.inverse();
 }
 
@@ -145,18 +158,9 @@ BundleStep bundle_step(const BundleNormal& normal, double damping) {
   std::vector<Eigen::Vector3d>& kept = frames_go ? result.points : result.frames;
   std::vector<Eigen::Vector3d>& gone = frames_go ? result.frames : result.points;
   kept = in_threes(step, n);
-  gone = back_substituted(frames_go ? normal.frames : normal.points, result.common);
-  for (const auto& [point, frame, information] : normal.crossings) {
-    const auto p = static_cast<std::size_t>(point), f = static_cast<std::size_t>(frame);
-    if (frames_go)
-      gone[f] += information.transpose() * kept[p];
-    else
-      gone[p] += information * kept[f];
-  }
-  for (std::size_t i = 0; i < gone.size(); ++i) {
-    gone[i] = frames_go ? Eigen::Vector3d(-inverse_of_frame(normal.frames[i], damping) * gone[i])
-                        : Eigen::Vector3d(-inverse_of_point(normal.points[i], damping) * gone[i]);
-  }
+  for (const NormalBlock& block : frames_go ? normal.frames : normal.points)
+    gone.emplace_back(block.gradient + block.by_common * result.common);
+  follow_kept(normal, damping, kept, gone);
   return result;
 }
 
@@ -173,17 +177,8 @@ BundleSlopes slopes_by_common(const BundleNormal& normal) {
                                         .solve_each(reduced.information.bottomLeftCorner(size, n));
     for (Eigen::Index at = 0; at < size; at += 3) kept.emplace_back(follow.middleRows<3>(at));
   }
-  const std::vector<NormalBlock>& blocks = frames_go ? normal.frames : normal.points;
-  for (const NormalBlock& block : blocks) gone.push_back(block.by_common);
-  for (const auto& [point, frame, information] : normal.crossings) {
-    const auto p = static_cast<std::size_t>(point), f = static_cast<std::size_t>(frame);
-    if (frames_go)
-      gone[f] += information.transpose() * kept[p];
-    else
-      gone[p] += information * kept[f];
-  }
-  for (std::size_t i = 0; i < gone.size(); ++i)
-    gone[i] = (-(frames_go ? inverse_of_frame(blocks[i], 0.0) : inverse_of_point(blocks[i], 0.0)) * gone[i]).eval();
+  for (const NormalBlock& block : frames_go ? normal.frames : normal.points) gone.push_back(block.by_common);
+  follow_kept(normal, 0.0, kept, gone);
   return slopes;
 }
 

@@ -152,13 +152,19 @@ TEST(Panorama, NoiseIsSeededAndOfItsSigma) {
   EXPECT_NEAR(sigma[0], std::sqrt(2.0 * (2.0 * 2.0 + 1.0 / 12.0)), 0.05);  // 76 800 pixels: ± 0.008
 }
 
-/// Each row of a rolling shutter is what a global one sees at that row's time.
-TEST(PanoramaFrame, RowsOfARollingShutterAreOfTheirTimes) {
-  FarWorld world = FarWorld::of_noise(3.0 / 300.0, 8);
+/// A steady pan with some tilt.
+RotationScene panning_scene() {
   RotationScene scene;
   scene.width_px = width, scene.height_px = height;
   scene.intrinsics = [](double) { return camera; };
   scene.motion = [](double t_s) { return Eigen::Vector3d(0.5 * t_s, 0.1 * t_s, 0.0); };
+  return scene;
+}
+
+/// Each row of a rolling shutter is what a global one sees at that row's time.
+TEST(PanoramaFrame, RowsOfARollingShutterAreOfTheirTimes) {
+  FarWorld world = FarWorld::of_noise(3.0 / 300.0, 8);
+  RotationScene scene = panning_scene();
   const auto frame = [&](double shutter_s, double delay_s) {
     scene.shutter_s = shutter_s, scene.delay_s = delay_s;
     return render_panorama_frame(world, scene, 15, 30.0, {.noise = 0.0}, 1);
@@ -176,10 +182,7 @@ TEST(PanoramaFrame, RowsOfARollingShutterAreOfTheirTimes) {
 /// A camera's clock that is fast by two in a hundred is 10 ms ahead after half a second.
 TEST(PanoramaFrame, AFastClockIsADelayThatGrows) {
   FarWorld world = FarWorld::of_noise(3.0 / 300.0, 9);
-  RotationScene scene;
-  scene.width_px = width, scene.height_px = height;
-  scene.intrinsics = [](double) { return camera; };
-  scene.motion = [](double t_s) { return Eigen::Vector3d(0.5 * t_s, 0.1 * t_s, 0.0); };
+  RotationScene scene = panning_scene();
   const auto frame = [&](double clock_rate, double delay_s) {
     scene.clock_rate = clock_rate, scene.delay_s = delay_s;
     return render_panorama_frame(world, scene, 15, 30.0, {.noise = 0.0}, 1);

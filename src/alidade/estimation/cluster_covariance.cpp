@@ -171,7 +171,11 @@ double mean_dof(const std::vector<Member>& members, const MatrixXd& shares, doub
   // Where every share is small, mutual influences are of second order.
   if (any_large) {
     squares += (shares * shares.transpose()).squaredNorm();
-    for (const Member& member : members) squares -= product(member.share, member.share).squaredNorm();
+    constexpr double little = 1e-3;  // of the degrees of freedom, all that is left out together
+    const double enough = std::sqrt(little * squares / static_cast<double>(members.size()));
+    for (const Member& member : members) {
+      if (member.share.squaredNorm() > enough) squares -= product(member.share, member.share).squaredNorm();
+    }
   }
   return total * total / std::max(squares, 1e-300);
 }

@@ -18,7 +18,7 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 struct Reduced {
   Eigen::MatrixXd S;  ///< Lower triangle, of the unscaled unknowns.
   Eigen::VectorXd rhs;
-  std::vector<Eigen::LLT<Pose6>> V_llt;
+  std::vector<PoseFactor> factors;
   bool ok = true;
 };
 
@@ -33,24 +33,25 @@ Reduced reduce(const NormalEquations& eq, double lambda) {
   reduced.S = eq.H;
   reduced.S.diagonal() *= 1.0 + lambda;
   reduced.rhs = -eq.gradient;
-  reduced.V_llt.reserve(eq.V.size());
+  reduced.factors.reserve(eq.V.size());
   constexpr Eigen::Index batch_views = 32;
   Eigen::MatrixXd Y(6 * batch_views, eq.num_globals);
   Eigen::Index filled = 0;
   for (std::size_t k = 0; k < eq.V.size(); ++k) {
     Pose6 V = eq.V[k];
     V.diagonal() *= 1.0 + lambda;
-    reduced.V_llt.emplace_back(V);
-    if (reduced.V_llt.back().info() != Eigen::Success) {
+    reduced.factors.emplace_back(V);
+    if (!reduced.factors.back().ok()) {
       reduced.ok = false;
       return reduced;
     }
     if (eq.num_globals == 0) continue;  // the poses alone: nothing to reduce
-    const auto L = reduced.V_llt.back().matrixL();
     auto rows = Y.middleRows<6>(filled);
     rows = eq.coupling(k).transpose();
-    L.solveInPlace(rows);
-    reduced.rhs += rows.transpose() * L.solve(eq.pose_gradient[k]);
+    reduced.factors.back().solve_lower(rows);
+    Vector6 gradient = eq.pose_gradient[k];
+    reduced.factors.back().solve_lower(gradient);
+    reduced.rhs += rows.transpose() * gradient;
     filled += 6;
     if (filled == Y.rows()) {
       subtract_outer(Y, reduced.S);
@@ -115,7 +116,8 @@ std::optional<Step> damped_step(const BundleProblem& problem, const BundleState&
   std::vector<Vector6> poses(eq.V.size());
   double decrease = -globals->dot(eq.gradient);
   for (std::size_t k = 0; k < poses.size(); ++k) {
-    poses[k] = reduced.V_llt[k].solve(-eq.pose_gradient[k] - eq.coupling(k).transpose() * *globals);
+    poses[k] = -eq.pose_gradient[k] - eq.coupling(k).transpose() * *globals;
+    reduced.factors[k].solve(poses[k]);
     if (!poses[k].allFinite()) return std::nullopt;
     decrease -= poses[k].dot(eq.pose_gradient[k]);
   }
@@ -135,6 +137,21 @@ std::optional<Eigen::MatrixXd> inverse_of(const Eigen::MatrixXd& scaled, BundleR
   constexpr double singular = 1e-13;  // below this the smallest eigenvalue is rounding
   if (!(eigen.values[0] > singular)) return std::nullopt;
   return eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
+}
+
+/// V⁻¹ Wᵀ: by how much a view's pose follows the first `count` globals.
+template <class Gain>
+Gain gain_of(const NormalEquations& eq, std::size_t view, const PoseFactor& V, Eigen::Index count) {
+  Gain gain = eq.coupling(view).topRows(count).transpose();
+  V.solve(gain);
+  return gain;
+}
+
+using SmallGain = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, Columns::max_lens>;
+
+void add_gained(const SmallGain& gain, const Eigen::MatrixXd& cov, Pose6& pose_cov) {
+  const SmallGain by_cov = gain.lazyProduct(cov);
+  pose_cov.noalias() += by_cov.lazyProduct(gain.transpose());
 }
 
 double degrees_of_freedom(const BundleProblem& problem) {
@@ -166,21 +183,23 @@ BundleResult with_covariance(BundleResult result, bool want_pose_cov) {
   if (!want_pose_cov) return result;
   result.pose_cov.reserve(eq.V.size());
   for (std::size_t k = 0; k < eq.V.size(); ++k) {
-    const Eigen::Matrix<double, 6, Eigen::Dynamic> gain = reduced.V_llt[k].solve(eq.coupling(k).transpose());
-    result.pose_cov.push_back(reduced.V_llt[k].solve(Pose6::Identity()) + gain * result.cov * gain.transpose());
+    Pose6 pose_cov = Pose6::Identity();
+    reduced.factors[k].solve(pose_cov);
+    if (eq.num_globals <= Columns::max_lens) {
+      add_gained(gain_of<SmallGain>(eq, k, reduced.factors[k], eq.num_globals), result.cov, pose_cov);
+    } else {
+      const auto gain = gain_of<Eigen::Matrix<double, 6, Eigen::Dynamic>>(eq, k, reduced.factors[k], eq.num_globals);
+      pose_cov += gain * result.cov * gain.transpose();
+    }
+    result.pose_cov.push_back(pose_cov);
   }
   return result;
 }
 
 void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result) {
   const NormalEquations& eq = *result.equations;
-  for (std::size_t k = 0; k < result.pose_cov.size(); ++k) {
-    using Gain = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, Columns::max_lens>;
-    Gain gain = eq.coupling(k).topRows(extra.rows()).transpose();
-    Eigen::LLT<Pose6>(eq.V[k]).solveInPlace(gain);
-    const Gain by_extra = gain.lazyProduct(extra);
-    result.pose_cov[k].noalias() += by_extra.lazyProduct(gain.transpose());
-  }
+  for (std::size_t k = 0; k < result.pose_cov.size(); ++k)
+    add_gained(gain_of<SmallGain>(eq, k, PoseFactor(eq.V[k]), extra.rows()), extra, result.pose_cov[k]);
 }
 
 BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <vector>
 
@@ -29,6 +30,49 @@ struct NormalEquations {
     const auto size = static_cast<std::size_t>(num_dense * (num_dense + 1));
     return {view_dense.data() + view * size, num_dense, num_dense + 1};
   }
+};
+
+/// Cholesky factor L of a view's pose block. Eigen packs blocks before it solves for several columns, which takes
+/// longer than these six rows do.
+class PoseFactor {
+ public:
+  explicit PoseFactor(const Eigen::Matrix<double, 6, 6>& V) : llt_(V) {
+    inverse_diagonal_ = llt_.matrixLLT().diagonal().cwiseInverse();
+  }
+  [[nodiscard]] bool ok() const { return llt_.info() == Eigen::Success; }
+
+  /// rows = L⁻¹ rows
+  template <class Rows>
+  void solve_lower(Rows&& rows) const {
+    const Eigen::Matrix<double, 6, 6>& L = llt_.matrixLLT();
+    for (Eigen::Index c = 0; c < rows.cols(); ++c) {
+      Eigen::Matrix<double, 6, 1> x = rows.col(c);
+      for (int j = 0; j < 6; ++j) {
+        x[j] *= inverse_diagonal_[j];
+        for (int i = j + 1; i < 6; ++i) x[i] -= L(i, j) * x[j];
+      }
+      rows.col(c) = x;
+    }
+  }
+
+  /// rows = V⁻¹ rows
+  template <class Rows>
+  void solve(Rows&& rows) const {
+    solve_lower(rows);
+    const Eigen::Matrix<double, 6, 6>& L = llt_.matrixLLT();
+    for (Eigen::Index c = 0; c < rows.cols(); ++c) {
+      Eigen::Matrix<double, 6, 1> x = rows.col(c);
+      for (int i = 5; i >= 0; --i) {
+        for (int j = i + 1; j < 6; ++j) x[i] -= L(j, i) * x[j];
+        x[i] *= inverse_diagonal_[i];
+      }
+      rows.col(c) = x;
+    }
+  }
+
+ private:
+  Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt_;
+  Eigen::Matrix<double, 6, 1> inverse_diagonal_;
 };
 
 /// Heights of the bow's two parabolas at every point, 1 in the centre and 0 at the border, from the printed board.

@@ -1,6 +1,5 @@
 #include "alidade/calibrate/solve/view_steps.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -39,30 +38,44 @@ bool shape_counts(const BundleProblem& problem) {
   return problem.views.size() < many_views;
 }
 
-/// From what the last linearisation kept of each view: lens and bow.
+constexpr int max_dense = Columns::max_lens + 2;  // lens and bow
+
+/// From what the last linearisation kept of each view: lens and bow. N: how many there are, all of them the lens',
+/// where that is known when this is compiled, which halves the time.
+template <int N>
 std::vector<ClusterStep> dense_steps(const BundleProblem& problem, const BundleResult& result,
                                      const Eigen::MatrixXd& X) {
-  constexpr int most = 18;  // dense globals and the gradient
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most, most>;
+  constexpr bool is_known = N != Eigen::Dynamic;
+  constexpr int with_gradient = is_known ? N + 1 : N, most = is_known ? N : max_dense;
   const NormalEquations& eq = *result.equations;
   const Index dense = eq.num_dense;
   const bool takes = X.cols() < dense && shape_counts(problem);
   std::vector<ClusterStep> steps;
   steps.reserve(eq.V.size());
-  const Small Xt = X.transpose();
-  Small reduced(dense, dense + 1), pull(X.cols(), dense + 1);
+  const Eigen::Matrix<double, N, N, Eigen::ColMajor, most, most> by_lens = X, by_lens_t = X.transpose();
+  Eigen::Matrix<double, N, with_gradient, Eigen::ColMajor, most, most + 1> reduced(dense, dense + 1),
+      pull(X.cols(), dense + 1);
+  Eigen::Matrix<double, 6, with_gradient, Eigen::ColMajor, 6, most + 1> rows(6, dense + 1);
   for (std::size_t k = 0; k < eq.V.size(); ++k) {
-    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V[k]);
-    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, most> rows(6, dense + 1);
     rows.leftCols(dense) = eq.coupling(k).transpose();
     rows.col(dense) = eq.pose_gradient[k];
-    V.matrixL().solveInPlace(rows);
-    reduced = eq.dense_of(k) - rows.leftCols(dense).transpose().lazyProduct(rows);  // the pose follows
-    pull = Xt.lazyProduct(reduced);
-    steps.push_back({pull.col(dense), pull.leftCols(dense).lazyProduct(X), {}});
-    if (takes) steps.back().taken = pull.leftCols(dense) * result.cov * pull.leftCols(dense).transpose();
+    PoseFactor(eq.V[k]).solve_lower(rows);
+    reduced = eq.dense_of(k);
+    reduced -= rows.template leftCols<N>(dense).transpose().lazyProduct(rows);  // the pose follows
+    pull = by_lens_t.lazyProduct(reduced);
+    const auto by_all = pull.template leftCols<N>(dense);
+    steps.push_back({pull.col(dense), by_all.lazyProduct(by_lens), {}});
+    if (takes) steps.back().taken = by_all * result.cov * by_all.transpose();
   }
   return steps;
+}
+
+std::vector<ClusterStep> dense_steps(const BundleProblem& problem, const BundleResult& result,
+                                     const Eigen::MatrixXd& X) {
+  const bool is_all = X.cols() == result.equations->num_dense;
+  if (is_all && X.cols() == 9) return dense_steps<9>(problem, result, X);
+  if (is_all && X.cols() == 8) return dense_steps<8>(problem, result, X);
+  return dense_steps<Eigen::Dynamic>(problem, result, X);
 }
 
 /// (J X)ᵀ J: the product with the view's columns themselves. J X has its pose taken out.
@@ -105,9 +118,10 @@ std::vector<ClusterStep> sparse_steps(const BundleProblem& problem, const Bundle
     const auto rows = static_cast<Index>(columns.num_rows());
     const ColumnsMap pose(columns[Columns::pose], rows, 6);
     const Eigen::Map<const Eigen::VectorXd> residual(columns[Columns::residual], rows);
-    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(Eigen::Matrix<double, 6, 6>(pose.transpose() * pose));
-    if (V.info() != Eigen::Success) continue;
-    const Eigen::Matrix<double, 6, Eigen::Dynamic> by_pose = V.solve(pose.transpose() * JX);
+    const PoseFactor V(pose.transpose() * pose);
+    if (!V.ok()) continue;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> by_pose = pose.transpose() * JX;
+    V.solve(by_pose);
     JX.noalias() -= pose * by_pose;  // the pose follows
     steps.back().step = JX.transpose() * residual;
     steps.back().spread.noalias() = JX.transpose() * JX;
@@ -140,6 +154,14 @@ void fill_pulls(const BundleProblem& problem, const Columns& columns, Index corn
   for (int c = 0; c < 6; ++c) by_pose.col(c).head(corners) = pull(Columns::pose + c);
 }
 
+/// Adds pullsᵀ pulls, the lower triangle: of a few columns, dot products are done before a product has packed them.
+template <class Pulls>
+void add_scatter(const Pulls& pulls, Eigen::MatrixXd& scatter) {
+  for (Index c = 0; c < pulls.cols(); ++c) {
+    for (Index d = 0; d <= c; ++d) scatter(c, d) += pulls.col(c).dot(pulls.col(d));
+  }
+}
+
 }  // namespace
 
 std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result,
@@ -161,8 +183,10 @@ CornerSteps corner_steps(const BundleProblem& problem, const BundleResult& resul
   const bool bows = problem.shape == BoardShape::bow;
   const BowBasis basis = bows ? bow_basis(problem.printed_points) : BowBasis{};
   Columns columns;
-  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(num_points, L.rows()), by_lens(num_points, X.rows());
+  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(num_points, X.rows()), by_lens(num_points, X.rows());
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(X.rows(), X.rows());
   Eigen::Matrix<double, Eigen::Dynamic, 6> by_pose(num_points, 6);
+  Eigen::Matrix<double, 6, Eigen::Dynamic> follows;
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t k = i * num_views / count;
     const ViewArrays& view = problem.views[k];
@@ -170,19 +194,20 @@ CornerSteps corner_steps(const BundleProblem& problem, const BundleResult& resul
     if (bows) fill_bow_columns(view, basis.along_x, basis.along_y, columns);
     const auto corners = static_cast<Index>(view.size());
     fill_pulls(problem, columns, corners, by_lens, by_pose);
-    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(result.equations->V[k]);
-    Eigen::Matrix<double, 6, Eigen::Dynamic> follows = result.equations->coupling(k).transpose().lazyProduct(X);
-    V.solveInPlace(follows);  // the pose does
-    const Eigen::MatrixXd pulls = by_lens.topRows(corners) * X - by_pose.topRows(corners) * follows;
-    found.by_themselves.noalias() += pulls.transpose() * pulls;
+    follows = result.equations->coupling(k).transpose();
+    PoseFactor(result.equations->V[k]).solve(follows);  // the pose does
+    auto pulls = by_lens.topRows(corners);
+    pulls.noalias() -= by_pose.topRows(corners).lazyProduct(follows);
+    add_scatter(pulls, scatter);
     for (Index c = 0; c < corners; ++c) scores.row(view.index[static_cast<std::size_t>(c)]) += pulls.row(c);
   }
   // Of an estimate from these views alone: what they share moves it as it moves that of all.
   const double scale = std::sqrt(static_cast<double>(num_views) / static_cast<double>(std::max<std::size_t>(1, count)));
+  const Eigen::MatrixXd steps = scale * scores * X;
   for (Index point = 0; point < num_points; ++point) {
-    if (scores.row(point).squaredNorm() > 0.0) found.steps.push_back({scale * scores.row(point).transpose(), {}, {}});
+    if (steps.row(point).squaredNorm() > 0.0) found.steps.push_back({steps.row(point).transpose(), {}, {}});
   }
-  found.by_themselves *= scale * scale;
+  found.by_themselves = scale * scale * (X.transpose() * scatter.selfadjointView<Eigen::Lower>() * X);
   return found;
 }
 

@@ -7,7 +7,9 @@
 #include <cstdlib>
 #include <functional>
 #include <numbers>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
 
@@ -22,12 +24,6 @@ namespace alidade {
 namespace {
 
 const Board test_board{.cols = 9, .rows = 6, .square_m = 0.025};
-/// How much slower than a quiet machine this one may be.
-double slowness() {
-  const char* given = std::getenv("ALIDADE_SLOWNESS");
-  return given ? std::atof(given) : 1.5;
-}
-
 /// Of the environment: other sessions, for figures.
 std::uint64_t first_session() {
   const char* given = std::getenv("ALIDADE_FIRST_SESSION");
@@ -260,13 +256,29 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// The best of several: others share the machine.
+/// The tutorial's way, as `make bench` measures it.
+double opencv_search_s(const cv::Mat& image) {
+  return seconds_of([&] {
+    std::vector<cv::Point2f> corners;
+    if (!cv::findChessboardCorners(image, {test_board.cols, test_board.rows}, corners)) return;
+    const cv::TermCriteria stop(cv::TermCriteria::EPS + cv::TermCriteria::MAX_ITER, 30, 0.001);
+    cv::cornerSubPix(image, corners, {11, 11}, {-1, -1}, stop);
+  });
+}
+
+/// The best of several, and in units of OpenCV's search on the same images just before: others share the machine.
 TEST(Speed, LooksAndSolvesInTime) {
   const Camera camera = true_camera(3);
   const BoardScene scene = draw_board_scene(camera, test_board, {.num_photos = 101}, 3);
   CaptureGuide guide(test_board);
   std::vector<cv::Mat> images;
   for (std::size_t i = 0; i < 4; ++i) images.push_back(render_board_photo(scene, i, {}, 3));
+  double search_s = 0.0;
+  for (const cv::Mat& image : images) {
+    double best_s = 1.0;
+    for (int k = 0; k < 8; ++k) best_s = std::min(best_s, opencv_search_s(image));
+    search_s += best_s / static_cast<double>(images.size());
+  }
   images.emplace_back(480, 640, CV_8U, cv::Scalar(128));
   double look_s = 0.0;
   for (std::size_t i = 0; i < images.size(); ++i) {
@@ -284,9 +296,11 @@ TEST(Speed, LooksAndSolvesInTime) {
   double solve_s = 1.0;
   for (int k = 0; k < 4; ++k)
     solve_s = std::min(solve_s, seconds_of([&] { (void)lens_so_far(test_board, views, vga, {}); }));
-  std::printf("a look %.1f ms, a solve of 100 photos %.1f ms\n", 1e3 * look_s, 1e3 * solve_s);
-  EXPECT_LE(look_s, 5e-3 * slowness());
-  EXPECT_LE(solve_s, 20e-3 * slowness());
+  std::printf("a look %.1f ms, a solve of 100 photos %.1f ms, OpenCV's search %.1f ms\n", 1e3 * look_s, 1e3 * solve_s,
+              1e3 * search_s);
+  const double slower = search_s / 2.25e-3;  // than the machine of docs/performance.md, where a search takes so long
+  EXPECT_LE(look_s, 5e-3 * slower);
+  EXPECT_LE(solve_s, 20e-3 * slower);
 }
 
 }  // namespace

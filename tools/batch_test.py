@@ -71,6 +71,20 @@ class Batch(unittest.TestCase):
         self.assertEqual({values["camera"][i] for i, z in enumerate(values["z"]) if abs(z) > 4 and values["quantity"][i] == "camera.fx"}, {"cam 7"})
         self.assertEqual(result["counts"]["given"], CAMERAS + 4)
 
+    def test_what_only_prints_is_no_result(self):
+        (self.folder / "jobs.csv").write_text("camera,arguments\n" + "".join(
+            f"c,{words}\n" for words in ("calibrate --help", "help calibrate", "simulate rotation --version", "schema observe", f"observe {self.made}/cam 0/log.csv -h")))
+        self.run_batch(code=4)
+        self.assertEqual([(row["exit_code"], row["verdict"]) for row in self.table()], [("2", "failed")] * 5)
+
+    def test_rows_of_an_earlier_list_go(self):
+        self.run_batch()
+        (self.folder / "lot/rows/mine").mkdir()
+        (self.folder / "lot/rows/mine/notes.txt").write_text("not a row")
+        (self.folder / "jobs.csv").write_text(f'camera,arguments,size\nonly,"observe ""{self.made}/cam 1/log.csv""",780x582\n')
+        self.run_batch()
+        self.assertEqual(sorted(path.name for path in (self.folder / "lot/rows").iterdir()), ["000001-only", "mine"])
+
     def test_shards_and_a_stopped_lot_go_on(self):
         self.run_batch("--shard", "1/2")
         self.assertFalse((self.folder / "lot/batch.csv").exists())

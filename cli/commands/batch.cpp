@@ -37,13 +37,16 @@ std::string row_folder(std::size_t i, const std::string& camera) {
   return fmt::format("rows/{:06}-{}", i + 1, name);
 }
 
-/// Options that a row may not have: the batch decides where results go, and a command that does not end has no result.
+/// Options that a row may not have: the batch decides where results go; what does not end or only prints has no result.
 std::string fault_of(const std::vector<std::string>& words) {
-  static const std::set<std::string> endless{"view", "batch", "study", "fleet"};
-  if (endless.contains(words.front())) return "'" + words.front() + "' is no command of a lot";
+  static const std::set<std::string> without_result{"view", "batch", "study", "fleet", "help", "schema"};
+  if (without_result.contains(words.front())) return "'" + words.front() + "' has no result that a batch could collect";
   for (const std::string& word : words) {
+    if (word == "--help" || word == "-h" || word == "--version")
+      return word + " has no result that a batch could collect";
     for (const char* const taken : {"--out", "--json", "--live"}) {
-      if (word == taken || word.starts_with(std::string(taken) + "=")) return std::string(taken) + " is the lot's own";
+      if (word == taken || word.starts_with(std::string(taken) + "="))
+        return std::string(taken) + " is set by the batch";
     }
   }
   return "";
@@ -89,6 +92,20 @@ class Lot {
             rows_[remaining[at]] = run_row(remaining[at]);
         },
         tbb::simple_partitioner());
+  }
+
+  /// Removes folders of rows that an earlier list had and this one has not.
+  void remove_earlier_rows() const {
+    std::set<std::string> current;
+    for (std::size_t i = 0; i < jobs_.size(); ++i) current.insert(row_file(i).parent_path().filename().string());
+    std::error_code error;
+    std::vector<std::filesystem::path> stale;
+    for (const auto& entry : std::filesystem::directory_iterator(run_.options.out / "rows", error)) {
+      if (!current.contains(entry.path().filename().string()) &&
+          std::filesystem::exists(entry.path() / "row.json", error))
+        stale.push_back(entry.path());
+    }
+    for (const auto& folder : stale) std::filesystem::remove_all(folder, error);
   }
 
   [[nodiscard]] std::vector<BatchRow> rows() const {
@@ -159,7 +176,7 @@ class Lot {
 };
 
 ExitCode run_batch(const BatchArgs& args, Run& run) {
-  if (run.options.keeps_outcome) throw UsageError("a lot leaves its rows in a folder: run it as a command");
+  if (run.options.keeps_outcome) throw UsageError("a batch leaves its rows in a folder: run it as a command");
   const Shard shard = shard_from(args.shard.empty() ? shard_of_rank() : args.shard);
   run.add_input("jobs", args.jobs);
   Lot lot(args, read_jobs(args.jobs), run);
@@ -171,6 +188,7 @@ ExitCode run_batch(const BatchArgs& args, Run& run) {
                       ": go on with --resume");
   }
   run.lap("rows");
+  lot.remove_earlier_rows();
   JobOutcome outcome = outcome_of(lot.rows());
   if (shard.count > 1) {
     // The last process, which requests all of them, makes the table.

@@ -16,7 +16,7 @@ help:
 	@echo "make deb-test: install and use them in a fresh Debian 12 root, and remove them"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
 	@echo "make docs    renew the images in README and docs"
-	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth"
+	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth; or one of: $(studies)"
 	@echo "make fuzz MINUTES=10   every reader of what others wrote, on bytes that nobody meant; docs/robustness.md"
 	@echo "make faults  failing calls, full disks, kill -9, 64 runs at once, under every command that writes (hours: FAULTS=--short, a minute)"
 	@echo "make sanitize  the tests under the address, undefined-behaviour and thread sanitizers"
@@ -122,28 +122,64 @@ docs: demo
 	@node web/test/screenshot.mjs build/demo/track/report.html docs/track.png 1500x740 0.6
 	@node web/test/screenshot.mjs build/demo/servo/report.html docs/servo.png 1500x690 0.6
 
+# Every part, and an exit code that says whether all of them reached their goals; `make study-heads` is one of them.
+studies = study-pages study-halves study-shared study-localize study-heads study-head-seeds study-long study-corners study-faults study-causes
+.PHONY: $(studies) study-build
 study:
+	@$(MAKE) --no-print-directory --keep-going $(studies)
+
+study-build:
 	@tools/setup build
 	@echo "study: building $(out)/alidade, study_localize, study_shared, study_causes, study_faults and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
 	@ninja -C $(out) $(jobs) study_localize study_shared study_causes study_faults corner_accuracy alidade_cli
 	@mkdir -p build/study
+
+$(studies): study-build
+
+# COMMAND of a study, NAME: its page goes to docs/studies-NAME.md, reached or not.
+study_page = $(1) >build/study/$(2).md; met=$$?; cp build/study/$(2).md docs/studies-$(2).md; exit $$met
+
+study-pages:
 	@tools/studies.py $(out)/alidade build/study
+
+study-halves:
 	@echo "study: halves of real sets, into docs/studies-halves.md"
-	@bench/study_halves.py $(out)/alidade 40 >build/study/halves.md; met=$$?; cp build/study/halves.md docs/studies-halves.md; exit $$met
+	@$(call study_page,bench/study_halves.py $(out)/alidade 40,halves)
+
+study-shared:
 	@echo "study: what makes corners share errors, into docs/studies-shared.md"
-	@$(out)/study_shared 800 >build/study/shared.md; met=$$?; cp build/study/shared.md docs/studies-shared.md; exit $$met
+	@$(call study_page,$(out)/study_shared 800,shared)
+
+study-localize:
 	@echo "study: localisation under water, into docs/studies-localize.md"
-	@$(out)/study_localize 200 20 >build/study/localize.md; met=$$?; cp build/study/localize.md docs/studies-localize.md; exit $$met
+	@$(call study_page,$(out)/study_localize 200 20,localize)
+
+study-heads:
 	@echo "study: 200 runs with a head, broken at random instants, into docs/studies-heads.md"
-	@tools/head_kills.py $(out)/alidade --runs 200 >build/study/heads.md; met=$$?; cp build/study/heads.md docs/studies-heads.md; exit $$met
+	@$(call study_page,tools/head_kills.py $(out)/alidade --runs 200,heads)
+
+# What a camera on a head by others sees; tools/head_seeds.py says how it is called.
+world = $(ALIDADE_DATA)/peers/heads/world_on_rotctld.py
+study-head-seeds:
+	@echo "study: 20 heads by others that calibrate themselves, into docs/studies-head-seeds.md"
+	@[ -x "$(world)" ] && command -v rotctld >/dev/null || { echo "study: left out: it needs rotctld, and a program that shows its world in ALIDADE_DATA"; exit 0; }; \
+	$(call study_page,tools/head_seeds.py $(out)/alidade $(world) --seeds 20 --together 1,head-seeds)
+
+study-long:
 	@echo "study: a million rows on standard input"
 	@tools/long_runs.py $(out)/alidade
+
+study-corners:
 	@$(out)/corner_accuracy
+
+study-faults:
 	@echo "study: how large a fault must be to be seen, into docs/studies-faults.md"
-	@$(out)/study_faults 20 >build/study/faults.md; met=$$?; cp build/study/faults.md docs/studies-faults.md; exit $$met
+	@$(call study_page,$(out)/study_faults 20,faults)
+
+study-causes:
 	@echo "study: what is wrong with rigs and rangefinders, and what is seen of it, into docs/studies-causes.md"
-	@$(out)/study_causes 100 >build/study/causes.md; met=$$?; cp build/study/causes.md docs/studies-causes.md; exit $$met
+	@$(call study_page,$(out)/study_causes 100,causes)
 
 format:
 	@tools/setup tidy

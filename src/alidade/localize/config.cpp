@@ -40,6 +40,12 @@ FieldList fields_of(LocalizeConfig& config) {
        .help = "Angular acceleration [rad/s2]; by hand about 6",
        .limits = positive,
        .option = "--sigma-alpha"},
+      {.name = "sigma_depth_sensor",
+       .value = &config.sigma_depth_sensor,
+       .help =
+           "σ of the scale of --depth-sensor, relative: the density of the water, fresh or sea, and the sensor's own "
+           "(0.01: 1 %)",
+       .limits = positive},
       {.name = "sigma_odometry",
        .value = &config.sigma_odometry,
        .help = "σ of the scale of --odometry, relative, as of a wheel's radius (0.01: 1 %)",

@@ -70,7 +70,9 @@ struct SensorScale {
   double scale = 1.0;      ///< Metres per unit of the path without it: 1 where a target gave correct metres.
   double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
-  bool is_in_time = true;  ///< There are readings within the time span of the path.
+  bool is_in_time = true;     ///< There are readings within the time span of the path.
+  double late_s = 0.0;        ///< The readings' clock less the camera's, where it is off: corrected.
+  double acceleration = 0.0;  ///< RMS of the camera's by this scale, over the one that is given.
 };
 
 /// Mean radial residual in rings about the principal point.

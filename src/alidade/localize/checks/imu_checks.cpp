@@ -5,7 +5,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/localize/checks/judge.h"
 
-// What is said of an IMU beside the camera.
+// What is said of sensors beside the camera.
 
 namespace alidade {
 namespace {
@@ -111,6 +111,20 @@ void add_imu(const Localization& report, Verdict& verdict) {
                                   std::string(imu.force_noise_factor > imu.rate_noise_factor ? "forces" : "rates") +
                                   " is " + text_of(noise, 2) + " times the given one; σ is enlarged for it",
                               noise, much, "1", "path"});
+}
+
+void add_sensor_readings(const SensorScale& sensor, Verdict& verdict) {
+  constexpr double fast = 5.0;
+  if (sensor.acceleration > fast)
+    verdict.checks.push_back({sensor.sensor + " unit", State::care,
+                              "by the " + sensor.sensor + " the camera accelerates " + text_of(sensor.acceleration, 2) +
+                                  " times as much as --sigma-a says: are its readings in metres?",
+                              sensor.acceleration, fast, "1", "path"});
+  if (sensor.late_s != 0.0)
+    verdict.checks.push_back({sensor.sensor + " clock", State::care,
+                              "the clock of the " + sensor.sensor + " is " + text_of(std::abs(sensor.late_s), 2) +
+                                  " s " + (sensor.late_s > 0.0 ? "after" : "before") + " the camera's: corrected",
+                              std::abs(sensor.late_s), 0.0, "s", "path"});
 }
 
 }  // namespace alidade

@@ -15,6 +15,9 @@ namespace alidade {
 /// Checks of those that have.
 void add_imu(const Localization& report, Verdict& verdict);
 
+/// Readings that are not in metres, or of another clock.
+void add_sensor_readings(const SensorScale& sensor, Verdict& verdict);
+
 /// Of a lens that the observations contradict, what of it is not as it was given: "focal length +2.1 % (12σ), centre u
 /// -3 px (8σ), k1 -0.02 (20σ)".
 [[nodiscard]] std::string lens_changes(const Localization& result);

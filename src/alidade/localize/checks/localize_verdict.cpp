@@ -257,6 +257,7 @@ void add_sensors(const Localization& report, Verdict& verdict) {
                                 0.0, 0.0, "", "path"});
       continue;
     }
+    add_sensor_readings(each, verdict);
     const double given_scale = report.is_scale_read ? (first ? first->scale : each.scale) : 1.0;
     const double sigma = std::hypot(each.sigma_rel, report.is_scale_read && first ? first->sigma_rel : 0.0);
     const double change = std::log(each.scale / given_scale), z = std::abs(change) / sigma;

@@ -2,7 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
@@ -66,16 +68,22 @@ std::optional<DepthFit> fitted(std::vector<DepthRow>& rows) {
 
 }  // namespace
 
-std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, std::span<const PathStep> path) {
+namespace {
+
+std::vector<DepthRow> rows_at(std::span<const DepthReading> readings, double late_s, std::span<const PathStep> path) {
   std::vector<DepthRow> rows;
   for (const DepthReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s);
+    const auto pose = pose_at(path, reading.t_s - late_s);
     if (!pose) continue;
     DepthRow row{reading.depth_m, 1.0 / reading.sigma_m, Eigen::Vector4d::Ones(), 0.0};
     row.row.head<3>() = pose->translation;
     rows.push_back(row);
   }
-  const std::size_t num_given = rows.size();
+  return rows;
+}
+
+/// By the readings that are near the others; these are left in `rows`.
+std::optional<DepthFit> fitted_without_far(std::vector<DepthRow>& rows) {
   constexpr std::size_t enough = 10;
   constexpr int rounds = 4;
   std::optional<DepthFit> fit;
@@ -88,17 +96,57 @@ std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, 
     const double limit = rejected_beyond * std::max(1.0, normal_from_mad * median_of(std::move(sizes)));
     if (round + 1 < rounds) std::erase_if(rows, [&](const DepthRow& row) { return std::abs(row.left) > limit; });
   }
+  return fit;
+}
+
+/// Mean square of what is left, in σ².
+double misfit_of(std::vector<DepthRow> rows) {
+  if (!fitted_without_far(rows)) return std::numeric_limits<double>::infinity();
+  double squares = 0.0;
+  for (const DepthRow& row : rows) squares += row.left * row.left;
+  return squares / static_cast<double>(rows.size());
+}
+
+/// How late the readings' clock is, where that explains clearly more than no offset: the least of a parabola through
+/// the best of a grid.
+double clock_of(std::span<const DepthReading> readings, std::span<const PathStep> path) {
+  constexpr double step_s = 0.05, clear = 12.0;  // of χ², 3.5σ
+  constexpr int most = 20;
+  std::array<double, 2 * most + 1> misfits{};
+  for (int i = -most; i <= most; ++i)
+    misfits[static_cast<std::size_t>(i + most)] = misfit_of(rows_at(readings, step_s * i, path));
+  const auto best = static_cast<std::size_t>(std::ranges::min_element(misfits) - misfits.begin());
+  std::vector<DepthRow> rows = rows_at(readings, step_s * (static_cast<double>(best) - most), path);
+  if (best == 0 || best + 1 == misfits.size() || !std::isfinite(misfits[best - 1] + misfits[best + 1]) ||
+      !fitted_without_far(rows))
+    return 0.0;
+  const double unit = std::max(1.0, misfits[best]) * inflation(rows) / static_cast<double>(rows.size());
+  if (!(misfits[most] - misfits[best] > clear * unit)) return 0.0;
+  const double curve = misfits[best - 1] - 2.0 * misfits[best] + misfits[best + 1];
+  const double share = curve > 0.0 ? 0.5 * (misfits[best - 1] - misfits[best + 1]) / curve : 0.0;
+  return step_s * (static_cast<double>(best) - most + std::clamp(share, -1.0, 1.0));
+}
+
+}  // namespace
+
+std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
+                                        std::span<const PathStep> path) {
+  const double late_s = clock_of(readings, path);
+  std::vector<DepthRow> rows = rows_at(readings, late_s, path);
+  const std::size_t num_given = rows.size();
+  const auto fit = fitted_without_far(rows);
+  if (!fit) return std::nullopt;
   const Eigen::Vector3d g = fit->values.head<3>();
   double squares = 0.0;
   for (const DepthRow& row : rows) squares += row.left * row.left;
   const double worse = std::max(1.0, squares / (static_cast<double>(rows.size()) - 4.0)) * inflation(rows);
   const Eigen::Matrix3d cov = worse * fit->cov.topLeftCorner<3, 3>();
-  ReadScale read{g.norm(), 1.0, rows.size(), num_given - rows.size()};
+  ReadScale read{g.norm(), 1.0, rows.size(), num_given - rows.size(), late_s};
   if (!(read.scale > 0.0)) return std::nullopt;
   const Eigen::Vector3d along = g / read.scale;
   const double variance = along.dot(cov * along), across = cov.trace() - variance;
   // |g| grows by what is not known across it.
-  read.sigma_rel = std::hypot(std::sqrt(variance) / read.scale, 0.5 * across / (read.scale * read.scale));
+  read.sigma_rel = std::hypot(std::sqrt(variance) / read.scale, 0.5 * across / (read.scale * read.scale), sigma_rel);
   constexpr double useless = 0.2, misfit = 0.5;
   if (!(read.sigma_rel < useless) || static_cast<double>(rows.size()) < misfit * static_cast<double>(num_given))
     return std::nullopt;
@@ -183,7 +231,9 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   }
   const double num = static_cast<double>(num_blocks), mean = sum / num;
   ReadScale read{std::exp(mean), 0.0, logs.size(), num_given - logs.size()};
-  const double of_beam = std::sqrt(std::max(beam.cov(beam_scale_param, beam_scale_param), 0.0)) / beam.scale;
+  constexpr double ordinary_scale = 0.005;
+  const double of_file = std::sqrt(std::max(beam.cov(beam_scale_param, beam_scale_param), 0.0)) / beam.scale;
+  const double of_beam = of_file > 0.0 ? of_file : ordinary_scale;
   // A curved surface is on one side of every plane through its points, by about as much as they are off it.
   const double of_surface = roughness / static_cast<double>(num_given);
   const double of_blocks = std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0));

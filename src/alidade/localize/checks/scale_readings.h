@@ -18,20 +18,22 @@ struct ReadScale {
   double scale = 1.0;      ///< Metres for each unit of the path.
   double sigma_rel = 1.0;  ///< Its σ over it.
   std::size_t num_used = 0, num_rejected = 0;
+  double late_s = 0.0;  ///< The readings' clock less the path's, where it is off.
 };
 
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
 [[nodiscard]] std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s);
 
 /// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of
-/// what is left over, whose neighbours in time are alike. Readings far from all others are rejected. None: the path
-/// moves too little up and down, or the readings do not fit it.
-[[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings,
+/// what is left over, whose neighbours in time are alike, and `sigma_rel`, which all share. Readings far from all
+/// others are rejected; a clock that is up to a second off is found by the residuals. None: the path moves too little
+/// up and down, or the readings do not fit it.
+[[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
                                                       std::span<const PathStep> path);
 
 /// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
 /// readings near their median, with the scatter of blocks of them as its σ. None: too few readings with points around
-/// them.
+/// them. Where the beam has no covariance the σ of its scale is an ordinary one, 0.5 %.
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 

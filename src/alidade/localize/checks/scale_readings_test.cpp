@@ -65,6 +65,7 @@ TEST(SensorScale, ADepthSensorGivesMetres) {
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const WalkRun run = long_walk(swimming(), seed);
     LocalizeConfig config;
+    config.sigma_depth_sensor = 1e-4;  // the readings' own σ is what is asked
     config.depth_readings = depths_of(run, 0.005, seed);
     for (std::size_t i = 0; i < config.depth_readings.size(); i += 37)
       config.depth_readings[i].depth_m += 2.0;  // bubbles
@@ -95,6 +96,38 @@ TEST(SensorScale, ARangefinderGivesMetres) {
     EXPECT_NEAR(read.scale / true_scale, 1.0, 3.0 * read.sigma_rel) << seed;
     EXPECT_NEAR(read.scale / true_scale, 1.0, 0.015) << seed;
     EXPECT_LT(result.error.ate_m, 0.03) << seed;
+  }
+}
+
+/// Without a target nothing shows that depths are 2.6 % too large, as of a sensor for fresh water in the sea.
+TEST(SensorScale, ADensityIsCountedAndAUnitNamed) {
+  const WalkRun run = long_walk(swimming(), 1);
+  LocalizeConfig config;
+  config.depth_readings = depths_of(run, 0.005, 1);
+  for (DepthReading& reading : config.depth_readings) reading.depth_m *= 1.026;
+  const Localization result = localize(run.frames, run.camera, config, run.truth);
+  ASSERT_TRUE(result.is_scale_read) << result.verdict.sentence;
+  EXPECT_NEAR(std::log(result.sensor_scales.front().scale / true_scale_of(1)), std::log(1.026), 0.01);
+  EXPECT_LT(std::log(1.026), 3.0 * result.sensor_scales.front().sigma_rel);
+  EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+  for (DepthReading& reading : config.depth_readings) reading.depth_m *= 100.0, reading.sigma_m *= 100.0;
+  const Verdict in_cm = localize(run.frames, run.camera, config).verdict;
+  EXPECT_NE(in_cm.state, State::good);
+  EXPECT_NE(in_cm.sentence.find("in metres?"), std::string::npos) << in_cm.sentence;
+}
+
+TEST(SensorScale, AClockThatIsOffIsNamedAndCorrected) {
+  for (const double late_s : {-0.2, 0.3}) {
+    const WalkRun run = long_walk(swimming(), 2);
+    LocalizeConfig config;
+    config.depth_readings = depths_of(run, 0.005, 2);
+    for (DepthReading& reading : config.depth_readings) reading.t_s += late_s;
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    ASSERT_EQ(result.sensor_scales.size(), 1u);
+    EXPECT_NEAR(result.sensor_scales.front().late_s, late_s, 0.03);
+    EXPECT_NEAR(result.sensor_scales.front().scale / true_scale_of(2), 1.0, 0.01);
+    EXPECT_NE(result.verdict.sentence.find("the clock of the depth sensor"), std::string::npos)
+        << result.verdict.sentence;
   }
 }
 

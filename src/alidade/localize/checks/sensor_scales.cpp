@@ -29,6 +29,20 @@ std::vector<Place> places_of(std::span<const OdometryReading> readings, std::spa
   return places;
 }
 
+/// Of the path, in its unit: differences of the mean rates of seconds one after the other, which noise hardly enters.
+double rms_acceleration(std::span<const PathStep> path) {
+  if (path.empty()) return 0.0;
+  constexpr double second = 1.0;
+  double squares = 0.0, num = 0.0;
+  for (double t_s = path.front().t_s + second; t_s + second <= path.back().t_s; t_s += second) {
+    const auto before = pose_at(path, t_s - second), at = pose_at(path, t_s), after = pose_at(path, t_s + second);
+    if (!before || !at || !after) continue;
+    squares += (before->translation - 2.0 * at->translation + after->translation).squaredNorm();
+    num += 1.0;
+  }
+  return num > 0.0 ? std::sqrt(squares / num) : 0.0;
+}
+
 }  // namespace
 
 std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> readings, double sigma_rel,
@@ -66,16 +80,26 @@ std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> read
 
 void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result) {
   result.sensor_scales.clear();
+  const double acceleration = rms_acceleration(result.path);
   const auto add = [&](const char* sensor, const auto& readings, const std::optional<ReadScale>& read) {
-    SensorScale scale{sensor, 1.0, 0.0, 0, 0, true};
-    if (read) scale = {sensor, read->scale, read->sigma_rel, read->num_used, read->num_rejected, true};
+    SensorScale scale{sensor};
+    if (read)
+      scale = {sensor,
+               read->scale,
+               read->sigma_rel,
+               read->num_used,
+               read->num_rejected,
+               true,
+               read->late_s,
+               read->scale * acceleration / config.filter.sigma_a_m_s2};
     scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {
       return !result.path.empty() && reading.t_s >= result.path.front().t_s && reading.t_s <= result.path.back().t_s;
     });
     result.sensor_scales.push_back(scale);
   };
   if (!config.depth_readings.empty())
-    add("depth sensor", config.depth_readings, scale_by_depth(config.depth_readings, result.path));
+    add("depth sensor", config.depth_readings,
+        scale_by_depth(config.depth_readings, config.sigma_depth_sensor, result.path));
   if (!config.range_readings.empty() && config.beam)
     add("rangefinder", config.range_readings, scale_by_range(config.range_readings, *config.beam, result.path, map));
   if (!config.odometry_readings.empty())

@@ -1,4 +1,4 @@
-// Did the motion tell enough? How it turned, and the information on the weakest combination.
+// Is the motion sufficient? Its angles or rates, and the information on the weakest combination.
 import type {Table} from '../core/document';
 import type {Figure} from '../core/figure';
 import {degrees, num} from '../core/format';
@@ -17,7 +17,7 @@ function lastOf(values: Float64Array): number {
 }
 
 export const observeMotion: Figure = {
-  id: 'motion', title: 'Did the motion tell enough?', note: 'x: tilting, y: panning', span: 8,
+  id: 'motion', title: 'Is the motion sufficient?', note: 'x: tilting, y: panning', span: 8,
   draw(host, doc, selection) {
     const scene = observeScene(doc);
     if (!scene) return null;
@@ -27,7 +27,7 @@ export const observeMotion: Figure = {
     const motion = angles.length > 0 ? angles : rates, weak = steps.numbers('weak_eigenvalue'), hasWeak = weak.some((v) => v > 0);
     if (motion.length === 0 && !hasWeak) return null;
     if (motion.length > 0)
-      new SeriesPlot(host, {...common, lines: motion, label: angles.length > 0 ? 'how the head stood, °' : 'how fast it turned, °/s', aside: motion.map((line, i) => `${['—', '- -', '···'][i]} ${line.name}`).join('   '),
+      new SeriesPlot(host, {...common, lines: motion, label: angles.length > 0 ? 'angles of the head, °' : 'angular rates, °/s', aside: motion.map((line, i) => `${['—', '- -', '···'][i]} ${line.name}`).join('   '),
         height: 150, aria: 'the motion over time', isFilling: true, digits: 3});
     const limit = lastOf(steps.numbers('weak_limit')), care = lastOf(steps.numbers('weak_care'));
     const check = doc.checks.find((one) => /weakest/.test(one.name));

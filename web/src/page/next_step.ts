@@ -5,7 +5,7 @@ import {num} from '../core/format';
 const uses: Record<string, (doc: Doc) => string> = {
   calibrate: () => 'camera.yaml holds the camera with its σ: give it to `alidade rangefinder`, `rig` or `localize`, or undistort photos with `alidade camera undistort camera.yaml PHOTOS`.',
   'camera diff': (doc) => (doc.state === 'good' ? 'Either camera may stand for the other, as far as their σ tell.' : 'Where the difference is above what both σ allow, calibrate the camera that is in doubt again.'),
-  observe: () => 'camera.yaml holds the camera at the end, intrinsics.csv all times. `alidade plan observe` names the turns that would tell more.',
+  observe: () => 'camera.yaml holds the camera at the end, intrinsics.csv all times. `alidade plan observe` names the rotations that would add most.',
   rangefinder: () => 'rangefinder.yaml holds the beam: `alidade project --beam rangefinder.yaml --camera camera.yaml --range METRES` tells where a reading lies in the image.',
   rig: (doc) => `rig.yaml holds the ${doc.table('cameras') ? 'cameras' : 'heads'}: \`alidade track events.csv --rig rig.yaml\` follows a target with ${doc.table('cameras') ? 'them' : 'it'}.`,
   track: () => 'track.csv holds the path with its σ at every instant.',

@@ -176,34 +176,62 @@ void fill_gain(const PositionerLog& log, PositionerFit& fit) {
   fit.sigma_gain = std::sqrt(s2 * normal.inverse()(1, 1));
 }
 
-void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& cost, PositionerFit& fit) {
+/// A fit to the encoder's samples.
+struct SampledFit {
+  PositionerProblem problem;
+  PositionerVector theta;
+  EncoderSampling sampling;
+  double cost = 0.0;
+};
+
+/// From a sampling and the latency that it leaves: the values fitted to the samples, and the sampling to the values.
+SampledFit fitted_to_samples(const PositionerProblem& as_asked, EncoderSampling sampling, PositionerVector theta) {
   constexpr int rounds = 4;
-  std::optional<EncoderSampling> sampling = problem.find_sampling(theta);
-  if (!sampling) return;
-  const PositionerProblem as_asked = problem;
-  const PositionerVector theta_as_asked = theta;
-  const double cost_as_asked = cost;
-  theta[P::latency] = std::max(0.0, theta[P::latency] - 0.5 * sampling->period_s);
+  SampledFit fit{as_asked, theta, sampling};
   for (int round = 0; round < rounds; ++round) {
-    problem = as_asked;
-    theta[P::sampling] = 0.0;
-    problem.set_sampling(*sampling, theta);
-    cost = problem.solve(theta, sampled_places);
-    sampling = problem.fitted(*sampling, theta);
+    fit.problem = as_asked;
+    fit.theta[P::sampling] = 0.0;
+    fit.problem.set_sampling(fit.sampling, fit.theta);
+    fit.cost = fit.problem.solve(fit.theta, sampled_places);
+    fit.sampling = fit.problem.fitted(fit.sampling, fit.theta);
     if (round == 0) {  // the residuals of the times of requests determine it better now
-      if (const auto again = as_asked.find_sampling(theta)) sampling = again;
+      if (const auto again = as_asked.find_sampling(fit.theta)) fit.sampling = *again;
     } else if (round + 1 < rounds) {
-      sampling = problem.refined(*sampling, theta);
+      fit.sampling = fit.problem.refined(fit.sampling, fit.theta);
     }
   }
-  fit.encoder_evidence = cost_as_asked - as_asked.misfit(theta).squaredNorm();
-  if (cost < 2.0 * cost_as_asked) {
-    fit.encoder_hz = 1.0 / sampling->period_s;
-    return;
+  return fit;
+}
+
+/// What was fitted to the times of requests can be so far off that readings are taken for other samples, and stay so:
+/// the cost has other minima, which leave readings unexplained. Starts anew from there.
+void leave_wrong_samples(const PositionerProblem& as_asked, double rate, SampledFit& best) {
+  constexpr double unexplained = 2.0, latency_share = 0.4;  // of the start that best_start() begins with
+  const auto explains = [&] { return best.cost < unexplained * static_cast<double>(as_asked.size()); };
+  if (explains()) return;
+  PositionerVector start = best_start(best.problem, rate, best.theta[P::latency] / latency_share);
+  const double latency_s = best.theta[P::latency], period_s = best.sampling.period_s;
+  for (const double cycles : {0.0, -0.1, 0.1, -0.25, 0.25}) {
+    start[P::latency] = std::max(0.0, latency_s + cycles * period_s);
+    SampledFit other = fitted_to_samples(as_asked, best.sampling, start);
+    if (other.cost < best.cost) best = std::move(other);
+    if (explains()) return;
   }
-  problem = as_asked;
-  theta = theta_as_asked;
-  cost = cost_as_asked;
+}
+
+void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& cost, PositionerFit& fit) {
+  const std::optional<EncoderSampling> sampling = problem.find_sampling(theta);
+  if (!sampling) return;
+  PositionerVector start = theta;
+  start[P::latency] = std::max(0.0, theta[P::latency] - 0.5 * sampling->period_s);
+  SampledFit best = fitted_to_samples(problem, *sampling, start);
+  leave_wrong_samples(problem, fit.fastest_rad_s, best);
+  fit.encoder_evidence = cost - problem.misfit(best.theta).squaredNorm();
+  if (best.cost >= 2.0 * cost) return;
+  fit.encoder_hz = 1.0 / best.sampling.period_s;
+  problem = std::move(best.problem);
+  theta = best.theta;
+  cost = best.cost;
 }
 
 /// Long moves that are over at the first reading after the command.

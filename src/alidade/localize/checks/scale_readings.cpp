@@ -200,6 +200,38 @@ std::optional<BeamScale> scale_at(const Rigid3& world_from_cam, const Beam& beam
   return BeamScale{std::log(scale), roughness / middle.norm()};
 }
 
+/// Of the log of the scale by the beam's parameters: the median over the readings, since a moved beam may hit between
+/// other points.
+BeamVector of_beam_params(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
+                          std::span<const MapPoint> map) {
+  constexpr double step = 1e-5;  // m, rad and shares alike
+  std::array<std::vector<double>, num_beam_params> slopes;
+  for (const RangeReading& reading : readings) {
+    const auto pose = pose_at(path, reading.t_s);
+    const auto scale = pose ? scale_at(*pose, beam, reading.range_m, map) : std::nullopt;
+    if (!scale) continue;
+    for (int k = 0; k < num_beam_params; ++k) {
+      const auto moved = scale_at(*pose, beam.retract(step * BeamVector::Unit(k)), reading.range_m, map);
+      if (moved) slopes[static_cast<std::size_t>(k)].push_back((moved->log_scale - scale->log_scale) / step);
+    }
+  }
+  BeamVector along = BeamVector::Zero();
+  for (int k = 0; k < num_beam_params; ++k) {
+    std::vector<double>& each = slopes[static_cast<std::size_t>(k)];
+    if (!each.empty()) along[k] = median_of(std::move(each));
+  }
+  return along;
+}
+
+/// σ of the scale by what is not known of the beam: an ordinary 0.5 % of its scale where the file says nothing.
+double sigma_by_beam(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
+                     std::span<const MapPoint> map) {
+  constexpr double ordinary_scale = 0.005;
+  if (!(beam.cov.diagonal().maxCoeff() > 0.0)) return ordinary_scale;
+  const BeamVector along = of_beam_params(readings, beam, path, map);
+  return std::sqrt(std::max(along.dot(beam.cov * along), 0.0));
+}
+
 }  // namespace
 
 std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
@@ -231,9 +263,7 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   }
   const double num = static_cast<double>(num_blocks), mean = sum / num;
   ReadScale read{std::exp(mean), 0.0, logs.size(), num_given - logs.size()};
-  constexpr double ordinary_scale = 0.005;
-  const double of_file = std::sqrt(std::max(beam.cov(beam_scale_param, beam_scale_param), 0.0)) / beam.scale;
-  const double of_beam = of_file > 0.0 ? of_file : ordinary_scale;
+  const double of_beam = sigma_by_beam(readings, beam, path, map);
   // A curved surface is on one side of every plane through its points, by about as much as they are off it.
   const double of_surface = roughness / static_cast<double>(num_given);
   const double of_blocks = std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0));

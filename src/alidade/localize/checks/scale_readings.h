@@ -33,7 +33,7 @@ struct ReadScale {
 
 /// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
 /// readings near their median, with the scatter of blocks of them as its σ. None: too few readings with points around
-/// them. Where the beam has no covariance the σ of its scale is an ordinary one, 0.5 %.
+/// them. σ of the beam is in it; where its file has none, 0.5 % of its scale.
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 

@@ -131,6 +131,22 @@ TEST(SensorScale, AClockThatIsOffIsNamedAndCorrected) {
   }
 }
 
+/// Beams that are off by as much as their covariance says: 15 mm along themselves are 1 % of the distance.
+TEST(SensorScale, WhatIsNotKnownOfTheBeamIsCounted) {
+  const WalkRun run = long_walk(swimming(), 1);
+  const Localization by_camera = localize(run.frames, run.camera, LocalizeConfig{});
+  for (const double off_m : {0.0, -0.03, 0.03}) {
+    Beam beam = beam_beside();
+    const std::vector<RangeReading> readings = ranges_of(run, beam, 1);
+    beam.origin_in_cam.z() += off_m;
+    beam.cov(2, 2) = 0.015 * 0.015;
+    const auto read = scale_by_range(readings, beam, by_camera.path, by_camera.map);
+    ASSERT_TRUE(read);
+    EXPECT_NEAR(std::log(read->scale / true_scale_of(1)), 0.0, 3.0 * read->sigma_rel) << off_m;
+    EXPECT_LT(read->sigma_rel, 0.02);
+  }
+}
+
 TEST(SensorScale, ASensorThatContradictsTheTargetIsNamed) {
   const WalkRun run = long_walk(swimming(), 5);
   LocalizeConfig config;

@@ -15,8 +15,11 @@ std::string at_pixel(const Eigen::Vector2d& px) {
   return "(" + std::to_string(std::lround(px.x())) + ", " + std::to_string(std::lround(px.y())) + ")";
 }
 
+constexpr int green = 1, red = 2, grey = 3;
+
 /// One channel with its candidates, in pixels of the photo.
 struct Channel {
+  int index;  ///< Of BGR; 3 is the grey photo.
   SpotSignal signal;
   std::vector<SpotCandidate> candidates;
 
@@ -27,7 +30,6 @@ struct Channel {
 };
 
 std::vector<int> channels_for(const cv::Mat& photo, SpotColour colour) {
-  constexpr int green = 1, red = 2, grey = 3;
   if (photo.channels() < 3 || colour == SpotColour::bright) return {grey};
   if (colour == SpotColour::red) return {red};
   if (colour == SpotColour::green) return {green};
@@ -52,6 +54,25 @@ const SpotCandidate* rival_of(const Channel& best, const std::vector<Channel>& c
   return nullptr;
 }
 
+/// Whether the grey photo has at least half of the light that a channel's excess adds to it: a laser's has, what
+/// compression makes of the colours at a print's edges has none, but blurs them alone.
+bool is_in_grey(const cv::Mat& photo, const LaserSpotAids& aids, const Channel& best) {
+  const SpotSignal in_grey = spot_signal(photo, grey, aids);
+  if (!in_grey.reason.empty()) return true;
+  const SpotCandidate& spot = best.candidates.front();
+  const float share = best.index == red ? 0.299F : 0.587F;
+  float light = 0.0F, excess = 0.0F;
+  for (Eigen::Index v = 0; v < in_grey.light.rows(); ++v) {
+    for (Eigen::Index u = 0; u < in_grey.light.cols(); ++u) {
+      const Eigen::Vector2d px(static_cast<double>(u), static_cast<double>(v));
+      if ((px - spot.px).norm() > 2.0 * spot.radius_px) continue;
+      light += in_grey.light(v, u);
+      excess += best.signal.detected(v, u);
+    }
+  }
+  return light >= 0.5F * share * excess;
+}
+
 LaserSpot no_spot(std::string reason) {
   LaserSpot spot;
   spot.reason = std::move(reason);
@@ -69,7 +90,7 @@ bool is_blown_out(const SpotSignal& signal) {
 LaserSpot find_laser_spot(const cv::Mat& photo, const LaserSpotAids& aids, const LaserSpotConfig& config) {
   std::vector<Channel> channels;
   for (const int channel : channels_for(photo, config.colour)) {
-    channels.push_back({spot_signal(photo, channel, aids), {}});
+    channels.push_back({channel, spot_signal(photo, channel, aids), {}});
     SpotSignal& signal = channels.back().signal;
     if (!signal.reason.empty()) return no_spot(signal.reason);
     if (is_blown_out(signal)) return no_spot("the photo is blown out");
@@ -83,6 +104,11 @@ LaserSpot find_laser_spot(const cv::Mat& photo, const LaserSpotAids& aids, const
   Eigen::Vector2d rival_px;
   if (rival_of(best, channels, config, rival_px) != nullptr)
     return no_spot("two candidates at " + at_pixel(best.px(candidate)) + " and " + at_pixel(rival_px));
+  const bool is_of_colours = best.signal.is_excess && best.signal.is_interpolated && !candidate.is_saturated;
+  const bool has_print = aids.seen_board && aids.seen_board->board.kind == BoardKind::chessboard;
+  if (is_of_colours && has_print && !is_in_grey(photo, aids, best))
+    return no_spot("no laser spot: at " + at_pixel(best.px(candidate)) +
+                   " the colour differs, the brightness does not");
   if (!candidate.reason.empty())
     return no_spot("the laser spot at " + at_pixel(best.px(candidate)) + " " + candidate.reason);
   const SpotPlace place = measure_spot(best.signal, candidate);

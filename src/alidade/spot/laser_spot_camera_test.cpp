@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "alidade/simulate/example_camera.h"
 #include "alidade/simulate/films/spot_photos.h"
@@ -103,6 +104,16 @@ TEST_P(SavedPhotos, SigmaSaysHowWellSpotsStand) {
   EXPECT_GE(3 * of_known[0].num_found, of_known[0].num_shown);
   EXPECT_GE(3 * of_known[1].num_found, of_known[1].num_shown);
   EXPECT_GE(3 * of_known[2].num_found, 2 * of_known[2].num_shown);
+}
+
+/// In these two photos compression makes patches of colour at the print's edges that stand out more than dim spots.
+TEST(SpotsInCompressedPhotos, ColoursAtEdgesAreNone) {
+  for (const auto& [trial, pose] : {std::pair<std::uint64_t, std::size_t>{4, 0}, {7, 2}}) {
+    Score of_known[3];
+    look_at_pose(scene_of(40 + trial), pose, {true, 75, 0.3}, 1000 * trial + 100 * pose, of_known);
+    const Score& with_pose = of_known[static_cast<int>(Known::pose)];
+    EXPECT_EQ(with_pose.num_beyond5, 0) << with_pose.text();
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, SavedPhotos,

@@ -18,16 +18,37 @@ namespace alidade {
 namespace {
 
 constexpr std::array<std::string_view, 2> kinds{"brown", "kannala_brandt"};
+constexpr double well = 0.8;  ///< The share of the observations that a kind explains.
 
 /// Observations against a path with its lens: squares over σ² up to the gate.
 struct Explained {
   double cost = 0.0;
-  std::size_t num = 0, num_fit = 0;
-  double rms_px = 0.0;  ///< Of those that fit, per point.
+  std::size_t num = 0, num_placed = 0, num_fit = 0;  ///< Placed: of a point of the map that is visible from there.
+  double rms_px = 0.0;                               ///< Of those that fit, per point.
+  /// Of those placed that do not, in frame after frame, the cosine between the errors of a point in both.
+  double sum_cosines = 0.0;
+  std::size_t num_cosines = 0;
 
   [[nodiscard]] double share() const {
     return static_cast<double>(num_fit) / static_cast<double>(std::max<std::size_t>(num, 1));
   }
+};
+
+/// The errors of the last observations that did not fit, by their points.
+class Misfits {
+ public:
+  void add(std::size_t frame, long id, const Eigen::Vector2d& error_px, Explained& sums) {
+    const auto [at, is_first] = last_.try_emplace(id, frame, error_px);
+    if (is_first) return;
+    if (at->second.first + 1 == frame) {
+      sums.sum_cosines += error_px.normalized().dot(at->second.second.normalized());
+      ++sums.num_cosines;
+    }
+    at->second = {frame, error_px};
+  }
+
+ private:
+  std::map<long, std::pair<std::size_t, Eigen::Vector2d>> last_;
 };
 
 Explained explained_by(const Localization& path, std::span<const ObservationFrame> frames,
@@ -35,6 +56,7 @@ Explained explained_by(const Localization& path, std::span<const ObservationFram
   std::map<long, Eigen::Vector3d> points;
   for (const MapPoint& point : path.map) points[point.id] = point.point_in_world;
   Explained sums;
+  Misfits misfits;
   double squares = 0.0;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     for (const FeatureObservation& each : frames[k].observations) {
@@ -45,7 +67,9 @@ Explained explained_by(const Localization& path, std::span<const ObservationFram
         px = project(path.camera, path.path[k].world_from_cam.inverse() * point->second);
       const double square = px ? (*px - each.px).squaredNorm() : 1e300, chi2 = square / (sigma_px * sigma_px);
       ++sums.num;
+      sums.num_placed += px ? 1 : 0;
       sums.cost += std::min(chi2, filter.gate);
+      if (px && !(chi2 < filter.gate)) misfits.add(k, each.id, *px - each.px, sums);
       if (!(chi2 < filter.gate)) continue;
       ++sums.num_fit;
       squares += square;
@@ -152,8 +176,11 @@ bool may_be_of_lens(const Verdict& verdict) {
   const std::set<std::string_view> of_lens{
       "innovations",      "frames lost",           "gated", "target",     "restarts", "camera",
       "radial structure", "position in the image", "σ",     "map's frame"};
-  return std::ranges::any_of(
-      verdict.checks, [&](const Check& check) { return check.state != State::good && of_lens.contains(check.name); });
+  // Innovations smaller than stated are no lens's doing.
+  return std::ranges::any_of(verdict.checks, [&](const Check& check) {
+    return check.state != State::good && of_lens.contains(check.name) &&
+           (check.name != "innovations" || check.value > check.limit);
+  });
 }
 
 /// Whether a lens of the given kind is estimated that leaves no other anything to explain.
@@ -164,18 +191,27 @@ bool is_explained(const Localization& result) {
          few * result.num_gated < result.num_used;
 }
 
+/// Whether so many observations are mismatches that no kind of lens explains enough: what a lens makes of a point is
+/// nearly the same in the next frame, and one mismatch has nothing in common with another.
+bool has_many_mismatches(const Explained& explained) {
+  constexpr std::size_t enough = 200;  // a cosine's mean by chance: 0.05
+  if (explained.num_cosines < enough) return false;
+  const double in_common = std::max(explained.sum_cosines / static_cast<double>(explained.num_cosines), 0.0);
+  const auto num_misfits = static_cast<double>(explained.num_placed - explained.num_fit);
+  return (1.0 - in_common) * num_misfits > (1.0 - well) * static_cast<double>(explained.num);
+}
+
 /// Whether the lens has no part in it: the path is of all that was seen, and nothing is left that depends on where in
 /// the image it was, as another kind of lens leaves it.
-bool leaves_no_trace(const Localization& result, std::span<const ObservationFrame> frames,
-                     const LocalizationFilterConfig& filter) {
+bool leaves_no_trace(const Localization& result, const Explained& explained) {
   constexpr double nearly_all = 0.99;
   const std::set<std::string_view> traces{"camera", "radial structure", "position in the image"};
-  if (!result.is_smoothed || result.path.size() != frames.size()) return false;
+  if (!result.is_smoothed) return false;
   if (std::ranges::any_of(result.verdict.checks, [&](const Check& check) {
         return check.state != State::good && traces.contains(check.name);
       }))
     return false;
-  return explained_by(result, frames, filter).share() >= nearly_all;
+  return explained.share() >= nearly_all;
 }
 
 std::string text_about(const OtherLensKind& other, const Lens& given) {
@@ -198,11 +234,15 @@ std::optional<OtherLensKind> other_lens_kind(std::span<const ObservationFrame> f
                                              std::span<const KnownPoint> target, const LocalizeConfig& config,
                                              const Localization& result) {
   constexpr std::size_t enough = 20, most = 300;
-  constexpr double far_better = 0.8, least_gain = 100.0, well = 0.8;
+  constexpr double far_better = 0.8, least_gain = 100.0;
   const std::string_view given_kind = model_name(result.camera.lens);
   if (frames.size() < enough || given_kind == "flat_port" || !may_be_of_lens(result.verdict)) return std::nullopt;
   if (std::ranges::none_of(result.path, &PathStep::has_pose) || is_explained(result)) return std::nullopt;
-  if (leaves_no_trace(result, frames, config.filter)) return std::nullopt;
+  if (result.path.size() == frames.size()) {
+    const Explained explained = explained_by(result, frames, config.filter);
+    if (leaves_no_trace(result, explained) || (result.is_smoothed && has_many_mismatches(explained)))
+      return std::nullopt;
+  }
   frames = frames.first(std::min(frames.size(), most));
   const Camera& as_given = result.given_camera ? *result.given_camera : result.camera;
   const Camera given = without_cov(as_given, as_given.lens);

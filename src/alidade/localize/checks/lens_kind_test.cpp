@@ -42,8 +42,9 @@ Localization located(const HoverRun& run, const Camera& camera) {
   return localize(run.frames, camera, config);
 }
 
-HoverRun brief_run(HoverLens lens, std::uint64_t seed) {
+HoverRun brief_run(HoverLens lens, std::uint64_t seed, double mismatches = 0.0) {
   Hover scene;
+  scene.mismatches = mismatches;
   scene.lens = lens;
   scene.num_frames = 90;
   scene.num_others = 40;
@@ -69,6 +70,14 @@ TEST(LensKind, APinholeForALensThatDistortsIsNamed) {
   const Localization result = located(run, as_kind("pinhole", run.camera));
   EXPECT_GE(result.verdict.state, State::bad);
   EXPECT_TRUE(names(result, "the lens is not a pinhole")) << result.verdict.sentence;
+}
+
+/// Mismatches alone are nothing to try other kinds for; beside what another kind leaves they hide none.
+TEST(LensKind, AnotherKindIsNamedAmongMismatches) {
+  const HoverRun run = brief_run(HoverLens::fisheye, 1, 0.1);
+  const Localization result = located(run, as_kind("pinhole", run.camera));
+  EXPECT_GE(result.verdict.state, State::bad);
+  EXPECT_TRUE(names(result, "calibrate with --model kannala_brandt")) << result.verdict.sentence;
 }
 
 /// Another setting of the same lens is not another kind.

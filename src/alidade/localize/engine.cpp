@@ -27,11 +27,17 @@ void LocalizeEngine::begin(std::span<const StartHypothesis> starts, double t_s, 
   t_s_ = t_s;
 }
 
-/// Frame and scale are the known points' where nothing else is given of either, and where all of them stay.
+/// Frame and scale are the known points' where nothing else is given of either, and where all of them stay. Depths so
+/// vague that hundreds of points say nothing of the scale beside a target are nothing.
+bool LocalizeEngine::is_frame_the_targets() const {
+  constexpr double vague = 0.25;
+  const bool has_depths = config_.depth_m && config_.sigma_depth < vague;
+  return !config_.start && !has_depths && !config_.map && config_.target.points.size() <= max_known_at_once;
+}
+
 ObservationsReport LocalizeEngine::update(std::span<const FeatureObservation> observations) {
   const ObservationsReport report = bank_->update(observations);
-  if (!config_.start && !config_.depth_m && !config_.map && config_.target.points.size() <= max_known_at_once)
-    bank_->fit_frame();
+  if (is_frame_the_targets()) bank_->fit_frame();
   return report;
 }
 

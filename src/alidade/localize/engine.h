@@ -55,6 +55,8 @@ class LocalizeEngine {
   void sum_up(const std::function<std::size_t(long id)>& num_used, Localization& result) const;
 
  private:
+  [[nodiscard]] bool is_frame_the_targets() const;
+
   Camera camera_;
   const LocalizeConfig& config_;
   std::optional<FilterBank> bank_;

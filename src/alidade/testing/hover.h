@@ -23,7 +23,8 @@ struct Hover {
   double sigma_px = 0.5, sigma_known_m = 0.001;
   double lasting = 0.0;  ///< Correlation of a point's pixel errors from frame to frame: as a drifting track has them.
   double distance_m = 0.9;
-  double sway = 1.0;  ///< Share of its translation: at 0 it rotates in place.
+  double sway = 1.0;  ///< Share of its translation: at 0 it rotates in place,
+  double turn = 1.0;  ///< and of its rotation: at 0 of both it stands still.
   // What is not as given.
   double readout_s = 0.0;           ///< From the first row to the last, the time being that of the central one.
   double target_speed_m_s = 0.0;    ///< Along x, against the other points.
@@ -129,6 +130,7 @@ inline Motion motion_of(const Hover& scene, Draws& draws) {
     motion.phase[i] = draws.uniform(0.0, 2.0 * std::numbers::pi);
   }
   motion.amplitude.head<3>() *= scene.sway;
+  motion.amplitude.tail<3>() *= scene.turn;
   return motion;
 }
 

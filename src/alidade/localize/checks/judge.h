@@ -18,6 +18,10 @@ void add_imu(const Localization& report, Verdict& verdict);
 /// Readings that are not in metres, or of another clock.
 void add_sensor_readings(const SensorScale& sensor, Verdict& verdict);
 
+/// |z| of what a score asks, with what anybody would believe of a lens: of one about which the observations know less
+/// than that, as those of a still camera, nothing is said.
+[[nodiscard]] double supported_z(const GivenNumber& given, const Camera& camera);
+
 /// Of a lens that the observations contradict, what of it is not as it was given: "focal length +2.1 % (12σ), centre u
 /// -3 px (8σ), k1 -0.02 (20σ)".
 [[nodiscard]] std::string lens_changes(const Localization& result);

@@ -1,10 +1,20 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "alidade/localize/checks/judge.h"
 
 namespace alidade {
+
+double supported_z(const GivenNumber& given, const Camera& camera) {
+  constexpr double any_focal = 0.2, any_centre = 0.05, any_k1 = 0.3;  // as a path's lens is freed: path_lens.cpp
+  double any = std::numeric_limits<double>::infinity();
+  if (given.name == "focal length") any = any_focal;
+  if (given.name.starts_with("centre")) any = any_centre * camera.width_px;
+  if (given.name == "k1") any = any_k1;
+  return given.z == 0.0 ? 0.0 : std::abs(given.z) / std::hypot(1.0, given.asked / (given.z * any));
+}
 
 std::string lens_changes(const Localization& report) {
   const std::vector<std::string> names = param_names(report.camera.lens);

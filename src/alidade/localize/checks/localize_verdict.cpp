@@ -126,15 +126,18 @@ std::string cause_text(const GivenNumber& given) {
          ": the camera file is not of this lens as it was used";
 }
 
-/// Of what was given, the one of which the observations ask most: a wrong lens moves the others' scores, too.
+/// Of what was given, the one of which the observations ask most: a wrong lens moves the others' scores, too. From one
+/// place the target looks as much shorter as it is tilted, which is not linear: nothing is said of its shape.
 void add_given(const Localization& report, Verdict& verdict) {
   const GivenNumber* worst = nullptr;
-  for (const GivenNumber& given : report.given)
-    if (worst == nullptr || std::abs(given.z) > std::abs(worst->z)) worst = &given;
+  for (const GivenNumber& given : report.given) {
+    if (report.is_from_one_place && given.name == "shape of the target") continue;
+    if (worst == nullptr || supported_z(given, report.camera) > supported_z(*worst, report.camera)) worst = &given;
+  }
   constexpr double care_z = 3.5, bad_z = 15.0, min_move = 0.5;
-  if (worst != nullptr && std::abs(worst->asked * worst->moves) > min_move && std::abs(worst->z) > care_z)
-    verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z), cause_text(*worst),
-                              std::abs(worst->z), care_z, "σ", "path"});
+  const double z = worst != nullptr ? supported_z(*worst, report.camera) : 0.0;
+  if (z > care_z && std::abs(worst->asked * worst->moves) > min_move)
+    verdict.checks.push_back({"camera", state_of(z, care_z, bad_z), cause_text(*worst), z, care_z, "σ", "path"});
   if (report.given_camera) {
     constexpr double much = 0.2;
     const double gated = share(report.num_gated, report.num_used + report.num_gated);

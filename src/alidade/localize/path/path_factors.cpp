@@ -230,6 +230,19 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
   add_acceleration(surroundings(state, k, system.chain), J, change, num_steps * step_variance, system);
 }
 
+/// Where what is given is tested, with what the motion asks of each pose and point.
+void PathSmoother::add_motion_and_pull(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
+  const PoseChain& chain = system.chain;
+  if (!system.has_given) return add_motion(state, k, system);
+  const Eigen::Vector<double, PoseChain::window> a = chain.a;
+  const Eigen::VectorXd b = chain.b;
+  add_motion(state, k, system);
+  PoseChain::Steps& pull = system.motion_pull;
+  for (std::size_t i = 0; i < 3 && k + i < pull.poses.size(); ++i)
+    pull.poses[k + i] += (chain.a - a).segment<6>(6 * static_cast<Eigen::Index>(i));
+  for (const std::size_t point : there_[k]) pull.points[point] += (chain.b - b).segment<3>(chain.place_of(point));
+}
+
 void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system) const {
   if (!problem_.start) return;
   const Rigid3 &given = problem_.start->motion.world_from_cam, &is = state.poses.front();
@@ -248,6 +261,9 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
 std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared, double most) const {
   SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_solved(), max_at_once_)};
   system.has_given = shared == Shared::all;
+  if (system.has_given)
+    system.motion_pull = {std::vector<Eigen::Vector<double, 6>>(state.poses.size(), Eigen::Vector<double, 6>::Zero()),
+                          std::vector<Eigen::Vector3d>(state.points.size(), Eigen::Vector3d::Zero())};
   add_given_lens(state, system);
   add_given_imu(state, system);
   add_start(state, system);
@@ -262,7 +278,7 @@ std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Sh
     }
     if (!add_observations(state, k, rows, system)) return std::nullopt;
     for (const std::size_t point : first_seen[k]) add_range(state, point, system);
-    if (k + 1 < state.poses.size()) add_motion(state, k, system);
+    if (k + 1 < state.poses.size()) add_motion_and_pull(state, k, system);
     add_imu(state, k, system);
     if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_given;
     if (fixed_ && fixed_->frame == k) add_fixed(state, system);

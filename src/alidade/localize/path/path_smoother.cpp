@@ -223,6 +223,21 @@ void PathSmoother::add_clock(SmoothedPath& path) const {
   path.given.push_back(clock);
 }
 
+/// How the motion's part of the cost falls along a direction of what is shared, poses and points following it: half of
+/// it, as a score.
+double PathSmoother::motion_score(const SmootherSystem& system, const Eigen::VectorXd& direction,
+                                  const PoseChain::Steps& at_rest) const {
+  const PoseChain::Steps moved = system.chain.steps(direction);
+  double score = 0.0;
+  for (std::size_t k = 0; k < moved.poses.size(); ++k)
+    score += system.motion_pull.poses[k].dot(moved.poses[k] - at_rest.poses[k]);
+  for (std::size_t i = 0; i < moved.points.size(); ++i)
+    if (lives_[i]) score += system.motion_pull.points[i].dot(moved.points[i] - at_rest.points[i]);
+  return score;
+}
+
+/// Of the scores the observations' and what is given, not the motion's: pixels' noise makes a still camera seem to
+/// move, by a longer lens a little less, and what that saves of accelerations grows with the number of frames.
 PathSmoother::Asked PathSmoother::asked(const SmootherSystem& system) const {
   const int num = num_solved(), all = causes_at_ + num_causes, rest = all - num;
   const Eigen::MatrixXd B = system.chain.B.topLeftCorner(all, all).selfadjointView<Eigen::Lower>();
@@ -232,6 +247,8 @@ PathSmoother::Asked PathSmoother::asked(const SmootherSystem& system) const {
   asked.J.bottomRows(rest).setIdentity();
   asked.information = B.bottomRightCorner(rest, rest) + B.bottomLeftCorner(rest, num) * asked.J.topRows(num);
   asked.score += asked.J.topRows(num).transpose() * system.chain.b.head(num);
+  const PoseChain::Steps at_rest = system.chain.steps(Eigen::VectorXd::Zero(all));
+  for (int i = 0; i < rest; ++i) asked.score[i] -= motion_score(system, asked.J.col(i), at_rest);
   return asked;
 }
 

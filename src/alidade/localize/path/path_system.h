@@ -28,6 +28,8 @@ struct SmootherSystem {
   double cost = 0.0;
   double observed_cost = 0.0;  ///< Of that, the observations'.
   bool has_given = false;      ///< What is given and not solved for stands in the border, too.
+  /// With that, what the motion's part of the cost asks of each pose and point: −½ of its derivatives.
+  PoseChain::Steps motion_pull = {};
 };
 
 /// Behind the lens in the border: see given_numbers.h.
@@ -102,13 +104,16 @@ class PathSmoother {
   void add_acceleration(const Surroundings& around, const WindowRows& J, Eigen::Vector<double, 6> error,
                         const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const;
   void add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
+  void add_motion_and_pull(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_start(const SmootherState& state, SmootherSystem& system) const;
   /// What is left of the normal equations for what is given, all that is solved for at its best.
   struct Asked {
     Eigen::MatrixXd J;  ///< Of all that is shared, by what is given.
     Eigen::MatrixXd information;
-    Eigen::VectorXd score;
+    Eigen::VectorXd score;  ///< Without what the motion says.
   };
+  [[nodiscard]] double motion_score(const SmootherSystem& system, const Eigen::VectorXd& direction,
+                                    const PoseChain::Steps& at_rest) const;
   [[nodiscard]] double best_cause(const Asked& all) const;
   /// path_imu.cpp.
   void begin_imu();

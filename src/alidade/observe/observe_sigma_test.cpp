@@ -146,6 +146,35 @@ TEST(ObserveSigma, CoversWhereErrorsAreSharedInTimeOrByTrack) {
   }
 }
 
+/// A patch that turns with the camera is compared with how it first looked: the error grows with the way from there,
+/// for each point in another direction.
+TEST(ObserveSigma, ATrackersErrorsAreNoCause) {
+  Scenario scenario;
+  scenario.num_points = 40;
+  scenario.disturb = [](RotationLog& log, Draws& draws) {
+    constexpr double px_per_px = 5e-4;
+    for (std::size_t i = 0; i < log.num_points; ++i) {
+      const Eigen::Vector2d first = log.rows.front().px[i];
+      Eigen::Matrix2d drift;
+      drift << draws.normal(), draws.normal(), draws.normal(), draws.normal();
+      for (RotationRow& row : log.rows) row.px[i] += px_per_px * drift * (row.px[i] - first);
+    }
+  };
+  int named = 0;
+  const int sets = testing::trials(6);
+  for (int set = 1; set <= sets; ++set) {
+    const RotationLog log = log_of(scenario, static_cast<std::uint64_t>(set));
+    const ObserveSetup config = config_of(ObserveMethod::batch);
+    const ObserveSolution report = solve_intrinsics(log, config);
+    ASSERT_EQ(report.status, ObserveSolution::Status::ok) << set;
+    const Verdict verdict = observe_verdict(report, log, config);
+    named += std::ranges::any_of(verdict.checks, [](const Check& check) { return check.name.starts_with("needs "); });
+    EXPECT_LT(z_of(report).cwiseAbs().maxCoeff(), 5.0) << set;
+    if (std::getenv("ALIDADE_SHOW")) std::printf("%d %s\n", set, verdict.sentence.c_str());
+  }
+  EXPECT_LE(named, sets / 10);
+}
+
 /// Half a second, though half of the noise does not last. One log says it to a third: 40 to 0.03 s; to 0.1 s with what
 /// the fit takes of it.
 TEST(ObserveSigma, FindsHowLongErrorsLast) {

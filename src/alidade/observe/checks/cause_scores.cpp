@@ -20,9 +20,11 @@ using Eigen::VectorXd;
 constexpr std::size_t max_observations = 40000;  // thinned by frames: power falls, the test does not
 constexpr int num_blocks = 12;
 constexpr double estimated_effect = 1.5;
-constexpr double min_given = 1e-10;  // of a cause's information that is its own: the rest is rounding
+constexpr std::size_t min_points = 12;     // fewer do not show what the errors of a point share
+constexpr double largest_of_tracks = 4.0;  // of a tracker's errors: what scatters more has a cause that must not hide
+constexpr double min_given = 1e-10;        // of a cause's information that is its own: the rest is rounding
 
-/// Score and information of a block of time, points eliminated: estimated parameters, then causes.
+/// Score and information of a block of time, or of a point, points eliminated: estimated parameters, then causes.
 struct Block {
   VectorXd gradient;
   MatrixXd information;
@@ -65,10 +67,15 @@ struct ReducedCause {
   }
 };
 
-/// A design effect estimated from few blocks is uncertain itself: of Hotelling's statistic, the χ² that is as rare.
-double as_rare_chi2(double chi2, double effect) {
-  constexpr double dof = num_blocks - 1.0;
-  return effect > estimated_effect ? dof * std::log1p(std::max(chi2, 0.0) / dof) : chi2;
+/// Variance of scores over what independent observations would leave, as so many clusters show it.
+struct DesignEffect {
+  double value = 1.0, clusters = num_blocks;
+};
+
+/// A design effect estimated from few clusters is uncertain itself: of Hotelling's statistic, the χ² that is as rare.
+double as_rare_chi2(double chi2, const DesignEffect& effect) {
+  const double dof = effect.clusters - 1.0;
+  return effect.value > estimated_effect ? dof * std::log1p(std::max(chi2, 0.0) / dof) : chi2;
 }
 
 class Linearisation {
@@ -164,6 +171,8 @@ class Linearisation {
   void gather() {
     const Index size = n_ + q_;
     blocks_.assign(num_blocks, {VectorXd::Zero(size), MatrixXd::Zero(size, size)});
+    const std::size_t num_points = reference_.bundle.points.size();
+    if (num_points >= min_points) by_track_.assign(num_points, {VectorXd::Zero(n_), MatrixXd::Zero(n_, size)});
     const auto& frames = reference_.bundle.frames;
     const double block_s = (frames.back().t_s - frames.front().t_s) / num_blocks;
     seen_ = seen_within(block_s, lasting_errors(reference_).seconds);
@@ -171,8 +180,13 @@ class Linearisation {
       const MatrixXd J = followed(seen, by_causes);
       Block& block = block_of(seen.frame);
       const double weight = residual_weight(reference_, i);
-      block.gradient.noalias() += weight * J.transpose() * (prediction_.px - seen.px);
+      const VectorXd pull = weight * J.transpose() * (prediction_.px - seen.px);
+      block.gradient += pull;
       block.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), weight);
+      if (by_track_.empty()) return;
+      Block& track = by_track_[static_cast<std::size_t>(seen.point)];
+      track.gradient.head(n_) += pull.head(n_);
+      track.information.topRows(n_).noalias() += weight * J.leftCols(n_).transpose() * J;
     });
     for (int k = 0; rotations_ && k < static_cast<int>(frames.size()); ++k)
       rotations_->add_prior(k, block_of(k).gradient, block_of(k).information);
@@ -186,7 +200,8 @@ class Linearisation {
     all_.gradient.head(n_) += reference_.solution.prior_gradient / every_;
   }
 
-  [[nodiscard]] double design_effect(const ReducedCause& cause, const VectorXd& step) const;
+  [[nodiscard]] DesignEffect design_effect(const ReducedCause& cause, const VectorXd& step) const;
+  [[nodiscard]] DesignEffect effect_of_tracks(const VectorXd& step) const;
   [[nodiscard]] double likely_share(const CauseColumns::Group& group, const ReducedCause& cause, const VectorXd& score,
                                     double explained, double effect) const;
   [[nodiscard]] CauseScore score_of(const CauseColumns::Group& group) const;
@@ -198,20 +213,37 @@ class Linearisation {
   double seen_ = 1.0;                             ///< Of the variance of sums, within blocks.
   std::vector<MatrixXd> by_point_;                ///< How each point follows the causes; where rotations are estimated,
   std::optional<EliminatedRotations> rotations_;  ///< these and the points.
-  std::vector<Block> blocks_;
+  std::vector<Block> blocks_, by_track_;          ///< A track's: rows of the estimated parameters alone.
   Block all_;
   MatrixXd inverse_nn_;
   RotationPrediction prediction_;
 };
 
 /// Scatter of the score over blocks of time, over what independent observations would leave.
-double Linearisation::design_effect(const ReducedCause& cause, const VectorXd& step) const {
+DesignEffect Linearisation::design_effect(const ReducedCause& cause, const VectorXd& step) const {
   MatrixXd scatter = MatrixXd::Zero(cause.width(), cause.width());
   for (const Block& block : blocks_) {
     const VectorXd left = cause.score(block.gradient + block.information * step);
     scatter += left * left.transpose();
   }
-  return std::max(1.0, (cause.S_inverse * scatter).trace() / cause.rank * num_blocks / (num_blocks - 1.0) / seen_);
+  const double by_blocks = (cause.S_inverse * scatter).trace() / cause.rank * num_blocks / (num_blocks - 1.0) / seen_;
+  const DesignEffect by_tracks = effect_of_tracks(step);
+  return by_tracks.value > by_blocks ? by_tracks : DesignEffect{std::max(1.0, by_blocks)};
+}
+
+/// The same over tracks, in the directions of the estimated parameters: a cause may have a parameter for each point,
+/// which takes up all that the errors of its track share.
+DesignEffect Linearisation::effect_of_tracks(const VectorXd& step) const {
+  if (by_track_.empty()) return {};
+  MatrixXd scatter = MatrixXd::Zero(n_, n_);
+  for (const Block& track : by_track_) {
+    const VectorXd left = track.gradient + track.information * step;
+    scatter += left * left.transpose();
+  }
+  const double count = static_cast<double>(by_track_.size());
+  const double effect = (inverse_nn_ * scatter).trace() / static_cast<double>(n_) * count / (count - 1.0);
+  const double by_chance = 1.0 + 3.0 * std::sqrt(2.0 / (count - 1.0));
+  return effect > by_chance ? DesignEffect{std::min(effect, largest_of_tracks), count} : DesignEffect{};
 }
 
 /// What it would take of the cause may be more than there ever is: a posterior, with a prior of ordinary sizes. The
@@ -233,8 +265,9 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   const ReducedCause cause(all_, inverse_nn_, std::move(at));
   const VectorXd s = cause.score(all_.gradient), value = -(cause.S_inverse * s);
   const VectorXd scaled = cause.unit.asDiagonal() * value, step = cause.step(scaled, n_ + q_);
-  const double effect = design_effect(cause, step), likelihood = -s.dot(value), explained = likelihood / effect;
-  const double chi2 = std::max(0.0, as_rare_chi2(explained, effect));
+  const DesignEffect shared = design_effect(cause, step);
+  const double effect = shared.value, likelihood = -s.dot(value), explained = likelihood / effect;
+  const double chi2 = std::max(0.0, as_rare_chi2(explained, shared));
   const double count = 2.0 * static_cast<double>(reference_.bundle.observations.size());
   CauseScore result{.name = group.name, .shift = step.head(n_)};
   result.z = std::sqrt(cause.rank > 1.0 ? std::max(0.0, chi2 - 2.0 * (cause.rank - 1.0)) : chi2);

@@ -35,10 +35,10 @@ struct CauseConfig {
 /// Score (Lagrange multiplier) tests of the reference, all from one linearisation: with point bearings and what was
 /// estimated eliminated, information S and score s of a cause give χ² = sᵀ S⁻¹ s and the value −S⁻¹ s. Where residuals
 /// share errors in time χ² is divided by their design effect in the cause's own directions, taken after its step:
-/// a cause does not hide behind the scatter that it makes. Tested: k1, k2, k3, p1 and p2, the lens whole; mount, delay,
-/// line time of a rolling shutter, lever arm (one parallax for all points, and each point's own along the view), a
-/// focal length that drifts, and the patterns of the log's rotation. Rotations that are estimated are eliminated
-/// with the points. Rao 1948; docs/maths/rotating-camera.md.
+/// a cause does not hide behind the scatter that it makes. Likewise where those of a track do, up to a factor of four.
+/// Tested: k1, k2, k3, p1 and p2, the lens whole; mount, delay, line time of a rolling shutter, lever arm (one parallax
+/// for all points, and each point's own along the view), a focal length that drifts, and the patterns of the log's
+/// rotation. Rotations that are estimated are eliminated with the points. Rao 1948; docs/maths/rotating-camera.md.
 [[nodiscard]] std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& reference,
                                                    const CauseConfig& config);
 

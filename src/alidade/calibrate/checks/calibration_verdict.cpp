@@ -132,14 +132,15 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
   Tails tails;
   std::vector<double> norms, norms_in_use;
   double predicted = 0.0, seen = 0.0;
+  const bool has_cov = have_covariances(views);
   for (std::size_t k = 0; k < views.size(); ++k) {
     if (!report.views[k].used) continue;
     for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
       const CornerResidual& fit = report.views[k].corners[i];
       if (!fit.residual_px.allFinite()) continue;
-      norms.push_back(fit.residual_px.norm());
-      if (norms.back() > tails.worst_px) {
-        tails.worst_px = norms.back();
+      norms.push_back(fit.residual_px.norm() / (has_cov ? std::sqrt(0.5 * views[k].corners[i].cov.trace()) : 1.0));
+      if (fit.residual_px.norm() > tails.worst_px) {
+        tails.worst_px = fit.residual_px.norm();
         tails.worst_photo = views[k].photo;
         tails.worst_index = views[k].corners[i].index;
       }
@@ -154,7 +155,7 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
   const auto is_far = [&](double norm) { return norm > 6.0 * robust_sigma; };
   tails.far = static_cast<int>(std::count_if(norms.begin(), norms.end(), is_far));
   tails.far_in_use = static_cast<int>(std::count_if(norms_in_use.begin(), norms_in_use.end(), is_far));
-  if (have_covariances(views)) tails.ratio = std::sqrt(seen / predicted);
+  if (has_cov) tails.ratio = std::sqrt(seen / predicted);
   return tails;
 }
 

@@ -118,6 +118,18 @@ TEST(CalibrationVerdict, WrongCornersOfATutorialAreNamed) {
   EXPECT_THAT(result.verdict.sentence, HasSubstr(views[7].photo));
 }
 
+TEST(CalibrationVerdict, ACornerIsHeldToItsOwnSigma) {
+  auto views = clean_views(2);
+  Corner& corner = views[7].corners[30];
+  corner.px.x() += 8.0 * std::sqrt(corner.cov(0, 0));  // of the others
+  const Check far = check_named(sample_calibration(views).verdict, "honest corners");
+  EXPECT_EQ(far.state, State::care) << far.text;
+  EXPECT_THAT(far.text, HasSubstr("1 corner is more than 6σ off"));
+  corner.cov *= 64.0;  // blurred, and says so
+  const Check blurred = check_named(sample_calibration(views).verdict, "honest corners");
+  EXPECT_EQ(blurred.state, State::good) << blurred.text;
+}
+
 TEST(CalibrationVerdict, CornersWorseThanTheirSigmaAreFlagged) {
   auto views = clean_views(2);
   for (BoardView& view : views) {

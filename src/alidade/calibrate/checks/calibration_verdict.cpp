@@ -118,19 +118,26 @@ Check consistent(const CalibrationStudy& study) {
   return check;
 }
 
-/// Corners against their own σ; without one, against the bulk of the others.
+/// Corners against their own σ, and against the bulk of the others.
 struct Tails {
   double ratio = std::nan("");  ///< RMS over what the corners' covariances predict.
-  int far = 0;                  ///< Corners more than 6 robust σ off, rejected ones among them.
+  int far = 0;  ///< Corners more than 6 robust σ off, in pixels and in units of their own σ; rejected ones among them.
   int far_in_use = 0;
   double worst_px = 0.0;
   std::string worst_photo;
   int worst_index = 0;
 };
 
+/// How far corners are off, in units of a scale that is the bulk's.
+struct Distances {
+  std::vector<double> norms;
+  [[nodiscard]] double limit() const { return 6.0 * median_of(norms) / std::sqrt(2.0 * std::log(2.0)); }
+};
+
 Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> views) {
   Tails tails;
-  std::vector<double> norms, norms_in_use;
+  Distances in_px, in_sigma;  // a blurred corner may be far off in pixels, a sharp one in a σ that knows noise alone
+  std::vector<bool> is_used;
   double predicted = 0.0, seen = 0.0;
   const bool has_cov = have_covariances(views);
   for (std::size_t k = 0; k < views.size(); ++k) {
@@ -138,23 +145,27 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
     for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
       const CornerResidual& fit = report.views[k].corners[i];
       if (!fit.residual_px.allFinite()) continue;
-      norms.push_back(fit.residual_px.norm() / (has_cov ? std::sqrt(0.5 * views[k].corners[i].cov.trace()) : 1.0));
-      if (fit.residual_px.norm() > tails.worst_px) {
-        tails.worst_px = fit.residual_px.norm();
+      const double norm_px = fit.residual_px.norm();
+      in_px.norms.push_back(norm_px);
+      in_sigma.norms.push_back(norm_px / (has_cov ? std::sqrt(0.5 * views[k].corners[i].cov.trace()) : 1.0));
+      is_used.push_back(fit.used);
+      if (norm_px > tails.worst_px) {
+        tails.worst_px = norm_px;
         tails.worst_photo = views[k].photo;
         tails.worst_index = views[k].corners[i].index;
       }
       if (!fit.used) continue;
-      norms_in_use.push_back(norms.back());
       predicted += views[k].corners[i].cov.trace();
       seen += fit.residual_px.squaredNorm();
     }
   }
-  if (norms.empty()) return tails;
-  const double robust_sigma = median_of(norms) / std::sqrt(2.0 * std::log(2.0));
-  const auto is_far = [&](double norm) { return norm > 6.0 * robust_sigma; };
-  tails.far = static_cast<int>(std::count_if(norms.begin(), norms.end(), is_far));
-  tails.far_in_use = static_cast<int>(std::count_if(norms_in_use.begin(), norms_in_use.end(), is_far));
+  if (in_px.norms.empty()) return tails;
+  const double limit_px = in_px.limit(), limit_sigmas = in_sigma.limit();
+  for (std::size_t i = 0; i < is_used.size(); ++i) {
+    if (!(in_px.norms[i] > limit_px && in_sigma.norms[i] > limit_sigmas)) continue;
+    ++tails.far;
+    tails.far_in_use += is_used[i] ? 1 : 0;
+  }
   if (has_cov) tails.ratio = std::sqrt(seen / predicted);
   return tails;
 }

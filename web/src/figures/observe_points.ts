@@ -49,7 +49,7 @@ function drawCloud(pen: Pen, du: Float64Array, dv: Float64Array, limit: number, 
 function drawBars(pen: Pen, points: OfPoint[]): void {
   const most = Math.min(points.length, Math.max(4, Math.floor((pen.h - 70) / 15))), shown = points.slice(0, most);
   const left = 46, right = pen.w - 14, x = scale(0, 1.1 * Math.max(...shown.map((p) => p.q95_px)), left, right), bottom = pen.h - 44, pitch = Math.min(24, (bottom - 22) / most);
-  pen.text(`by point: bar RMS, tick 95 %${most < points.length ? `; ${most} of ${points.length}` : ''}`, left, 9, {size: 11.5, weight: 600});
+  pen.text(`RMS by point, tick 95 %${most < points.length ? `; ${most} of ${points.length}` : ''}`, left, 9, {size: 11.5, weight: 600});
   xAxis(pen, x, 22, bottom, {label: 'residual, px', wanted: 4});
   shown.forEach((p, i) => {
     const y = 22 + pitch * i;

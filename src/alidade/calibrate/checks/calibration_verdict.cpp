@@ -123,21 +123,24 @@ struct Tails {
   double ratio = std::nan("");  ///< RMS over what the corners' covariances predict.
   int far = 0;  ///< Corners more than 6 robust σ off, in pixels and in units of their own σ; rejected ones among them.
   int far_in_use = 0;
-  double worst_px = 0.0;
+  double worst_px = 0.0;  ///< The farthest of these.
   std::string worst_photo;
   int worst_index = 0;
 };
 
-/// How far corners are off, in units of a scale that is the bulk's.
-struct Distances {
-  std::vector<double> norms;
-  [[nodiscard]] double limit() const { return 6.0 * median_of(norms) / std::sqrt(2.0 * std::log(2.0)); }
+/// Six robust σ of distances in the plane.
+double far_limit(const std::vector<double>& norms) { return 6.0 * median_of(norms) / std::sqrt(2.0 * std::log(2.0)); }
+
+/// How far a corner is from where the fit puts it.
+struct CornerDistance {
+  std::size_t photo, index;  ///< In the views.
+  double norm_px, norm;      ///< In pixels, and in units of its own σ where it has one.
 };
 
 Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> views) {
   Tails tails;
-  Distances in_px, in_sigma;  // a blurred corner may be far off in pixels, a sharp one in a σ that knows noise alone
-  std::vector<bool> is_used;
+  std::vector<CornerDistance> corners;
+  std::vector<double> norms_px, norms;
   double predicted = 0.0, seen = 0.0;
   const bool has_cov = have_covariances(views);
   for (std::size_t k = 0; k < views.size(); ++k) {
@@ -145,26 +148,25 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
     for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
       const CornerResidual& fit = report.views[k].corners[i];
       if (!fit.residual_px.allFinite()) continue;
-      const double norm_px = fit.residual_px.norm();
-      in_px.norms.push_back(norm_px);
-      in_sigma.norms.push_back(norm_px / (has_cov ? std::sqrt(0.5 * views[k].corners[i].cov.trace()) : 1.0));
-      is_used.push_back(fit.used);
-      if (norm_px > tails.worst_px) {
-        tails.worst_px = norm_px;
-        tails.worst_photo = views[k].photo;
-        tails.worst_index = views[k].corners[i].index;
-      }
-      if (!fit.used) continue;
-      predicted += views[k].corners[i].cov.trace();
-      seen += fit.residual_px.squaredNorm();
+      const double norm_px = fit.residual_px.norm(), trace = views[k].corners[i].cov.trace();
+      corners.push_back({k, i, norm_px, norm_px / (has_cov ? std::sqrt(0.5 * trace) : 1.0)});
+      norms_px.push_back(corners.back().norm_px);
+      norms.push_back(corners.back().norm);
+      predicted += fit.used ? trace : 0.0;
+      seen += fit.used ? fit.residual_px.squaredNorm() : 0.0;
     }
   }
-  if (in_px.norms.empty()) return tails;
-  const double limit_px = in_px.limit(), limit_sigmas = in_sigma.limit();
-  for (std::size_t i = 0; i < is_used.size(); ++i) {
-    if (!(in_px.norms[i] > limit_px && in_sigma.norms[i] > limit_sigmas)) continue;
+  if (corners.empty()) return tails;
+  // A blurred corner may be far off in pixels, a sharp one in a σ that knows noise alone.
+  const double limit_px = far_limit(norms_px), limit = far_limit(norms);
+  for (const CornerDistance& corner : corners) {
+    if (!(corner.norm_px > limit_px && corner.norm > limit)) continue;
     ++tails.far;
-    tails.far_in_use += is_used[i] ? 1 : 0;
+    tails.far_in_use += report.views[corner.photo].corners[corner.index].used ? 1 : 0;
+    if (corner.norm_px <= tails.worst_px) continue;
+    tails.worst_px = corner.norm_px;
+    tails.worst_photo = views[corner.photo].photo;
+    tails.worst_index = views[corner.photo].corners[corner.index].index;
   }
   if (has_cov) tails.ratio = std::sqrt(seen / predicted);
   return tails;

@@ -38,44 +38,29 @@ bool shape_counts(const BundleProblem& problem) {
   return problem.views.size() < many_views;
 }
 
-constexpr int max_dense = Columns::max_lens + 2;  // lens and bow
-
-/// From what the last linearisation kept of each view: lens and bow. N: how many there are, all of them the lens',
-/// where that is known when this is compiled, which halves the time.
-template <int N>
+/// From what the last linearisation kept of each view: lens and bow.
 std::vector<ClusterStep> dense_steps(const BundleProblem& problem, const BundleResult& result,
                                      const Eigen::MatrixXd& X) {
-  constexpr bool is_known = N != Eigen::Dynamic;
-  constexpr int with_gradient = is_known ? N + 1 : N, most = is_known ? N : max_dense;
+  constexpr int most = Columns::max_lens + 2;  // dense globals and the gradient
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most, most>;
   const NormalEquations& eq = *result.equations;
   const Index dense = eq.num_dense;
   const bool takes = X.cols() < dense && shape_counts(problem);
   std::vector<ClusterStep> steps;
   steps.reserve(eq.V.size());
-  const Eigen::Matrix<double, N, N, Eigen::ColMajor, most, most> by_lens = X, by_lens_t = X.transpose();
-  Eigen::Matrix<double, N, with_gradient, Eigen::ColMajor, most, most + 1> reduced(dense, dense + 1),
-      pull(X.cols(), dense + 1);
-  Eigen::Matrix<double, 6, with_gradient, Eigen::ColMajor, 6, most + 1> rows(6, dense + 1);
+  const Small Xt = X.transpose();
+  Small reduced(dense, dense + 1), pull(X.cols(), dense + 1);
   for (std::size_t k = 0; k < eq.V.size(); ++k) {
+    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, most> rows(6, dense + 1);
     rows.leftCols(dense) = eq.coupling(k).transpose();
     rows.col(dense) = eq.pose_gradient[k];
     PoseFactor(eq.V[k]).solve_lower(rows);
-    reduced = eq.dense_of(k);
-    reduced -= rows.template leftCols<N>(dense).transpose().lazyProduct(rows);  // the pose follows
-    pull = by_lens_t.lazyProduct(reduced);
-    const auto by_all = pull.template leftCols<N>(dense);
-    steps.push_back({pull.col(dense), by_all.lazyProduct(by_lens), {}});
-    if (takes) steps.back().taken = by_all * result.cov * by_all.transpose();
+    reduced = eq.dense_of(k) - rows.leftCols(dense).transpose().lazyProduct(rows);  // the pose follows
+    pull = Xt.lazyProduct(reduced);
+    steps.push_back({pull.col(dense), pull.leftCols(dense).lazyProduct(X), {}});
+    if (takes) steps.back().taken = pull.leftCols(dense) * result.cov * pull.leftCols(dense).transpose();
   }
   return steps;
-}
-
-std::vector<ClusterStep> dense_steps(const BundleProblem& problem, const BundleResult& result,
-                                     const Eigen::MatrixXd& X) {
-  const bool is_all = X.cols() == result.equations->num_dense;
-  if (is_all && X.cols() == 9) return dense_steps<9>(problem, result, X);
-  if (is_all && X.cols() == 8) return dense_steps<8>(problem, result, X);
-  return dense_steps<Eigen::Dynamic>(problem, result, X);
 }
 
 /// (J X)ᵀ J: the product with the view's columns themselves. J X has its pose taken out.

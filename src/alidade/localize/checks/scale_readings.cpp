@@ -66,10 +66,6 @@ std::optional<DepthFit> fitted(std::vector<DepthRow>& rows) {
   return fit;
 }
 
-}  // namespace
-
-namespace {
-
 std::vector<DepthRow> rows_at(std::span<const DepthReading> readings, double late_s, std::span<const PathStep> path) {
   std::vector<DepthRow> rows;
   for (const DepthReading& reading : readings) {

@@ -34,7 +34,11 @@ double rms_acceleration(std::span<const PathStep> path) {
   if (path.empty()) return 0.0;
   constexpr double second = 1.0;
   double squares = 0.0, num = 0.0;
-  for (double t_s = path.front().t_s + second; t_s + second <= path.back().t_s; t_s += second) {
+  double next_s = path.front().t_s + second;
+  for (const PathStep& step : path) {
+    const double t_s = step.t_s;
+    if (t_s < next_s) continue;
+    next_s = t_s + second;
     const auto before = pose_at(path, t_s - second), at = pose_at(path, t_s), after = pose_at(path, t_s + second);
     if (!before || !at || !after) continue;
     squares += (before->translation - 2.0 * at->translation + after->translation).squaredNorm();

@@ -20,11 +20,11 @@ using Eigen::VectorXd;
 constexpr std::size_t max_observations = 40000;  // thinned by frames: power falls, the test does not
 constexpr int num_blocks = 12;
 constexpr double estimated_effect = 1.5;
-constexpr std::size_t min_points = 12;     // fewer do not show what the errors of a point share
+constexpr std::size_t min_tracks = 12;     // fewer do not show what the errors of a track share
 constexpr double largest_of_tracks = 4.0;  // of a tracker's errors: what scatters more has a cause that must not hide
 constexpr double min_given = 1e-10;        // of a cause's information that is its own: the rest is rounding
 
-/// Score and information of a block of time, or of a point, points eliminated: estimated parameters, then causes.
+/// Score and information of a block of time, or of a track, points eliminated: estimated parameters, then causes.
 struct Block {
   VectorXd gradient;
   MatrixXd information;
@@ -172,7 +172,7 @@ class Linearisation {
     const Index size = n_ + q_;
     blocks_.assign(num_blocks, {VectorXd::Zero(size), MatrixXd::Zero(size, size)});
     const std::size_t num_points = reference_.bundle.points.size();
-    if (num_points >= min_points) by_track_.assign(num_points, {VectorXd::Zero(n_), MatrixXd::Zero(n_, size)});
+    if (num_points >= min_tracks) by_track_.assign(num_points, {VectorXd::Zero(n_), MatrixXd::Zero(n_, size)});
     const auto& frames = reference_.bundle.frames;
     const double block_s = (frames.back().t_s - frames.front().t_s) / num_blocks;
     seen_ = seen_within(block_s, lasting_errors(reference_).seconds);
@@ -213,7 +213,7 @@ class Linearisation {
   double seen_ = 1.0;                             ///< Of the variance of sums, within blocks.
   std::vector<MatrixXd> by_point_;                ///< How each point follows the causes; where rotations are estimated,
   std::optional<EliminatedRotations> rotations_;  ///< these and the points.
-  std::vector<Block> blocks_, by_track_;          ///< A track's: rows of the estimated parameters alone.
+  std::vector<Block> blocks_, by_track_;          ///< Of tracks rows of the estimated parameters alone.
   Block all_;
   MatrixXd inverse_nn_;
   RotationPrediction prediction_;

@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "alidade/board_detector/find_board.h"
+#include "alidade/calibrate/checks/lens_covariance.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/solve/normal_equations.h"
 #include "alidade/camera/projection_sigma.h"
@@ -34,23 +35,41 @@ void time_calibrate(benchmark::State& state, const SolveCase& solve_case) {
   }
 }
 
-/// One step's normal equations, at the true lens; the poses need not be right for their time to be.
-void time_linearize(benchmark::State& state, const SolveCase& solve_case) {
-  const Corners& corners = corners_of(solve_case);
-  const CalibrateReport report = calibrate(corners.board, corners.views, corners.size, {});
-  BundleProblem problem;
-  (void)set_up_problem(corners.board, {}, corners.size, problem);
+/// A case's problem, and where its solve ends.
+struct SolvedCase {
   std::vector<ViewArrays> arrays;
-  BundleState bundle{report.camera.lens, {}, report.board_points};
-  for (std::size_t k = 0; k < corners.views.size(); ++k) {
-    arrays.push_back(make_arrays(corners.views[k]));
-    bundle.cam_from_board.push_back(report.views[k].cam_from_board);
+  BundleProblem problem;
+  BundleState state;
+
+  explicit SolvedCase(const Corners& corners) {
+    const CalibrateReport report = calibrate(corners.board, corners.views, corners.size, {});
+    (void)set_up_problem(corners.board, {}, corners.size, problem);
+    state = {report.camera.lens, {}, report.board_points};
+    for (std::size_t k = 0; k < corners.views.size(); ++k) {
+      arrays.push_back(make_arrays(corners.views[k]));
+      state.cam_from_board.push_back(report.views[k].cam_from_board);
+    }
+    problem.views = arrays;
   }
-  problem.views = arrays;
+};
+
+/// One step's normal equations.
+void time_linearize(benchmark::State& state, const SolveCase& solve_case) {
+  const SolvedCase solved(corners_of(solve_case));
   NormalEquations equations;
   for (auto _ : state) {
-    if (!linearize(problem, bundle, equations)) state.SkipWithError("a corner cannot be projected");
+    if (!linearize(solved.problem, solved.state, equations)) state.SkipWithError("a corner cannot be projected");
     benchmark::DoNotOptimize(equations.cost);
+  }
+}
+
+/// What clusters add to the model's covariance: photos and corners of the board.
+void time_clusters(benchmark::State& state, const SolveCase& solve_case) {
+  const SolvedCase solved(corners_of(solve_case));
+  const BundleResult result = with_covariance(solve_bundle(solved.problem, solved.state, {}));
+  if (result.status != BundleResult::Status::converged) state.SkipWithError("no convergence");
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(lens_covariance(solved.problem, 1.0, {}, result).stated.data());
   }
 }
 
@@ -78,6 +97,7 @@ void add_all(const std::vector<std::string>& photos) {
   for (const SolveCase& solve_case : all_cases()) {
     add("calibrate/" + name_of(solve_case), [=](benchmark::State& state) { time_calibrate(state, solve_case); });
     add("linearize/" + name_of(solve_case), [=](benchmark::State& state) { time_linearize(state, solve_case); });
+    add("clusters/" + name_of(solve_case), [=](benchmark::State& state) { time_clusters(state, solve_case); });
   }
   add("projection_sigma/60x40", time_projection_sigma);
   for (const unsigned seed : {1u, 2u, 3u, 4u, 5u}) {

@@ -85,13 +85,12 @@ void find_poses(const std::vector<std::optional<Rigid3>>& known, CalibrateReport
 
 /// RMS, noise and the corners' fates, from the final residuals.
 void fill_views(const CalibrationWork& work, const BundleResult& result, const NoiseEstimate& noise,
-                double variance_scale, CalibrateReport& report) {
+                CalibrateReport& report) {
   double total = 0.0;
   for (std::size_t k = 0; k < work.views.size(); ++k) {
     ViewFit& fit = report.views[work.number[k]];
     fit.used = true;
     fit.cam_from_board = result.state.cam_from_board[k];
-    if (k < result.pose_cov.size()) fit.pose_cov = variance_scale * result.pose_cov[k];
     const auto residuals = residuals_px(result.state, k, work.arrays[k]);
     double sum = 0.0, count = 0.0;
     for (std::size_t i = 0; i < residuals.size(); ++i) {
@@ -112,12 +111,22 @@ void fill_views(const CalibrationWork& work, const BundleResult& result, const N
   report.excess_px = noise.excess_px;
 }
 
+/// Poses follow the lens with its stated covariance.
+void fill_pose_covariances(const CalibrationWork& work, const BundleResult& result, double variance_scale,
+                           const Eigen::MatrixXd& stated, CalibrateReport& report) {
+  const std::vector<int>& free = work.problem.free_lens;
+  const auto num_free = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd cov = variance_scale * result.cov;
+  cov.topLeftCorner(num_free, num_free) = stated(free, free);
+  const auto covs = pose_covariances(result, variance_scale, cov);
+  for (std::size_t k = 0; k < covs.size(); ++k) report.views[work.number[k]].pose_cov = covs[k];
+}
+
 /// Lens, poses and board shape with their covariances. The model's is in units of what the residuals say; what is
-/// stated counts that the corners of a photo share errors: photos are its clusters. Returns s² of the whitened
-/// residuals.
-double fill_estimate(const CalibrationWork& work, Minima& minima, const NoiseEstimate& noise, ImageSize size,
-                     CalibrateReport& report) {
-  BundleResult& result = minima.least;
+/// stated counts that the corners of a photo share errors: photos are its clusters.
+void fill_estimate(const CalibrationWork& work, Minima& minima, const NoiseEstimate& noise, ImageSize size,
+                   CalibrateReport& report) {
+  const BundleResult& result = minima.least;
   const double variance_scale = variance_of(work, result, noise);
   report.camera.width_px = size.width_px;
   report.camera.height_px = size.height_px;
@@ -125,15 +134,15 @@ double fill_estimate(const CalibrationWork& work, Minima& minima, const NoiseEst
   report.board_points = result.state.board_points;
   const auto num_params = params(result.state.lens).size();
   report.camera.cov = report.model_cov = Eigen::MatrixXd::Zero(num_params, num_params);
-  if (result.cov.size() == 0) return variance_scale;
+  if (result.cov.size() == 0) return;
   LensCovariance lens = lens_covariance(work.problem, variance_scale, minima.others, result);
   for (std::size_t k = 0; k < minima.others.size(); ++k)
     report.other_lenses.push_back({minima.others[k].state.lens, lens.weights[k]});
+  fill_pose_covariances(work, result, variance_scale, lens.stated, report);
   report.model_cov = std::move(lens.model);
   report.camera.cov = std::move(lens.stated);
   report.clusters = std::move(lens.clusters);
   report.board_sigma_z_m = shape_sigma_z(work.problem, result.cov, variance_scale);
-  return variance_scale;
 }
 
 /// Refuses the first parameter with a σ that makes it no answer.
@@ -254,8 +263,8 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   NoiseEstimate noise;
   Minima minima = solve_robustly(config, size, std::move(state), report, work, noise);
   const BundleResult& result = minima.least;
-  const double variance_scale = fill_estimate(work, minima, noise, size, report);
-  fill_views(work, result, noise, variance_scale, report);
+  fill_estimate(work, minima, noise, size, report);
+  fill_views(work, result, noise, report);
   report.camera.rms_px = report.rms_px;
   if (work.views.size() < least) {
     too_few();

@@ -36,7 +36,8 @@ struct Principal {
 
 /// x: the score, by the model of mean 0 and covariance `share`.
 struct Member {
-  MatrixXd share;
+  MatrixXd share;  ///< Empty where all members have the same, of the unit matrix.
+  double trace;    ///< Of the share.
   VectorXd x;
   VectorXd contradiction;  ///< The part of x along directions in which the cluster contradicts the others; empty: none.
   std::optional<Principal> principal;  ///< Where the leverage is large.
@@ -63,13 +64,14 @@ Principal principal_of(const MatrixXd& share, const MatrixXd* taken, const Vecto
 
 /// `cluster` is whitened; `equal_share` is that of one that brings none.
 Member member_of(ClusterStep&& cluster, double noise_variance, double equal_share) {
-  Member member{.share = std::move(cluster.spread)};
+  Member member{.share = std::move(cluster.spread), .trace = 0.0};
   const VectorXd step = cluster.step / std::sqrt(noise_variance);
   if (member.share.size() == 0) {
-    member.share = equal_share * MatrixXd::Identity(step.size(), step.size());
+    member.trace = equal_share * static_cast<double>(step.size());
     member.x = step / std::sqrt(1.0 - equal_share);
     return member;
   }
+  member.trace = member.share.trace();
   const bool has_taken = cluster.taken.size() > 0;
   MatrixXd leverage;
   if (has_taken) leverage = member.share.ldlt().solve(cluster.taken).transpose();
@@ -92,13 +94,13 @@ void find_contradictions(std::vector<Member>& members, Eigen::Index n) {
   double sum = 0.0, expected = 0.0;
   for (const Member& member : members) {
     sum += member.x.squaredNorm();
-    expected += member.share.trace();
+    expected += member.trace;
   }
   const double chance2 = 2.0 * std::log(20.0 * static_cast<double>(members.size()) * static_cast<double>(n));
   for (Member& member : members) {
     if (!member.principal) continue;  // (1 − m)⁻¹ is as good as (1 − m)^(−1/2)
     const double others =
-        (sum - member.x.squaredNorm()) / std::max(expected - member.share.trace(), std::numeric_limits<double>::min());
+        (sum - member.x.squaredNorm()) / std::max(expected - member.trace, std::numeric_limits<double>::min());
     Principal& principal = *member.principal;
     for (Eigen::Index k = 0; k < n; ++k) {
       double& y = principal.y[k];
@@ -206,10 +208,11 @@ Scatter scatter_of(const std::vector<Member>& members, const MatrixXd& direction
   const Eigen::Index n = directions.cols();
   Scatter scatter{MatrixXd::Zero(n, n), MatrixXd::Zero(n, n), MatrixXd::Zero(n, n)};
   for (const Member& member : members) {
-    scatter.seen += member.x * member.x.transpose();
+    scatter.seen.noalias() += member.x * member.x.transpose();
     if (member.contradiction.size() > 0) scatter.certain += member.contradiction * member.contradiction.transpose();
-    scatter.expected += member.share;
+    if (!equal_shares) scatter.expected += member.share;
   }
+  if (equal_shares) scatter.expected.setIdentity();
   const double total = std::max(scatter.expected.trace(), 1e-12);
   scatter.mean = scatter.seen.trace() / total;
   if (equal_shares) {
@@ -248,7 +251,7 @@ void state_whitened(const MatrixXd& L, double noise_variance, std::vector<Cluste
   }
   find_contradictions(members, n);
   for (const Member& member : members) {
-    result.z2.push_back(member.x.squaredNorm() / std::max(member.share.trace(), 1e-12));
+    result.z2.push_back(member.x.squaredNorm() / std::max(member.trace, 1e-12));
   }
   const MatrixXd directions = L.rowwise().normalized();
   const Scatter scatter = scatter_of(members, directions, equal_shares);

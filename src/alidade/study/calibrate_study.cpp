@@ -40,7 +40,7 @@ Eigen::MatrixXd bound_of(const BoardScene& scene, const std::vector<int>& free, 
   problem.prior_information = Eigen::VectorXd::Zero(num);
   problem.printed_points = scene.points_in_board;
   const BundleState truth{scene.camera.lens, scene.cam_from_board, scene.points_in_board};
-  const BundleResult at_truth = with_covariance(solve_bundle(problem, truth, {.max_iterations = 5}), false);
+  const BundleResult at_truth = with_covariance(solve_bundle(problem, truth, {.max_iterations = 5}));
   if (at_truth.cov.rows() < static_cast<Eigen::Index>(free.size()))
     throw ConfigError("so few photos do not determine the camera: more --photos");
   const auto size = static_cast<Eigen::Index>(free.size());

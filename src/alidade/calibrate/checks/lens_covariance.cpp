@@ -76,7 +76,7 @@ std::vector<double> count_others(const BundleProblem& problem, double noise_vari
 }  // namespace
 
 LensCovariance lens_covariance(const BundleProblem& problem, double noise_variance,
-                               std::span<const BundleResult> others, BundleResult& result) {
+                               std::span<const BundleResult> others, const BundleResult& result) {
   const std::vector<int>& free = problem.free_lens;
   const auto num_free = static_cast<Eigen::Index>(free.size());
   const Eigen::Index num_params = params(result.state.lens).size();
@@ -92,7 +92,6 @@ LensCovariance lens_covariance(const BundleProblem& problem, double noise_varian
     clusters = cluster_covariance(inverse, noise_variance, {});
   }
   std::vector<double> weights = count_others(problem, noise_variance, result, others, clusters);
-  follow_lens(clusters.cov / noise_variance - inverse, result);
   return {among_all(clusters.cov, free, num_params), among_all(noise_variance * inverse, free, num_params),
           among_all(std::move(clusters), free, num_params), std::move(weights)};
 }

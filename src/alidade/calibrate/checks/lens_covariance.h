@@ -13,10 +13,10 @@ struct LensCovariance {
   std::vector<double> weights;  ///< Of the other minima: how likely each is, all of them and `result` being 1.
 };
 
-/// `noise_variance`: of the whitened residuals. `result` must have its covariance; its poses' follow what is stated.
+/// `noise_variance`: of the whitened residuals. `result` must have its covariance.
 /// `others`: minima of the cost that lie elsewhere. Each is as likely as exp(−Δ/(2 c s²)) says, Δ by what its cost is
 /// greater, c the design effect, and what is stated reaches to it by that weight.
 [[nodiscard]] LensCovariance lens_covariance(const BundleProblem& problem, double noise_variance,
-                                             std::span<const BundleResult> others, BundleResult& result);
+                                             std::span<const BundleResult> others, const BundleResult& result);
 
 }  // namespace alidade

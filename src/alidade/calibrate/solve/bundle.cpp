@@ -139,21 +139,6 @@ std::optional<Eigen::MatrixXd> inverse_of(const Eigen::MatrixXd& scaled, BundleR
   return eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
 }
 
-/// V⁻¹ Wᵀ: by how much a view's pose follows the first `count` globals.
-template <class Gain>
-Gain gain_of(const NormalEquations& eq, std::size_t view, const PoseFactor& V, Eigen::Index count) {
-  Gain gain = eq.coupling(view).topRows(count).transpose();
-  V.solve(gain);
-  return gain;
-}
-
-using SmallGain = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, Columns::max_lens>;
-
-void add_gained(const SmallGain& gain, const Eigen::MatrixXd& cov, Pose6& pose_cov) {
-  const SmallGain by_cov = gain.lazyProduct(cov);
-  pose_cov.noalias() += by_cov.lazyProduct(gain.transpose());
-}
-
 double degrees_of_freedom(const BundleProblem& problem) {
   double rows = 0.0;
   for (const ViewArrays& view : problem.views) rows += 2.0 * static_cast<double>(view.size()) - 6.0;
@@ -162,7 +147,7 @@ double degrees_of_freedom(const BundleProblem& problem) {
 
 }  // namespace
 
-BundleResult with_covariance(BundleResult result, bool want_pose_cov) {
+BundleResult with_covariance(BundleResult result) {
   if (result.status != BundleResult::Status::converged) return result;
   const NormalEquations& eq = *result.equations;
   const Reduced reduced = reduce(eq, 0.0);
@@ -180,26 +165,29 @@ BundleResult with_covariance(BundleResult result, bool want_pose_cov) {
     return result;
   }
   result.cov = scale.asDiagonal() * *inverse * scale.asDiagonal();
-  if (!want_pose_cov) return result;
-  result.pose_cov.reserve(eq.V.size());
-  for (std::size_t k = 0; k < eq.V.size(); ++k) {
-    Pose6 pose_cov = Pose6::Identity();
-    reduced.factors[k].solve(pose_cov);
-    if (eq.num_globals <= Columns::max_lens) {
-      add_gained(gain_of<SmallGain>(eq, k, reduced.factors[k], eq.num_globals), result.cov, pose_cov);
-    } else {
-      const auto gain = gain_of<Eigen::Matrix<double, 6, Eigen::Dynamic>>(eq, k, reduced.factors[k], eq.num_globals);
-      pose_cov += gain * result.cov * gain.transpose();
-    }
-    result.pose_cov.push_back(pose_cov);
-  }
   return result;
 }
 
-void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result) {
+std::vector<Pose6> pose_covariances(const BundleResult& result, double noise_variance, const Eigen::MatrixXd& cov) {
   const NormalEquations& eq = *result.equations;
-  for (std::size_t k = 0; k < result.pose_cov.size(); ++k)
-    add_gained(gain_of<SmallGain>(eq, k, PoseFactor(eq.V[k]), extra.rows()), extra, result.pose_cov[k]);
+  constexpr int few = Columns::max_lens + 2;  // lens and bow: products of small matrices, done before they are packed
+  using SmallGain = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, few>;
+  std::vector<Pose6> covs(eq.V.size(), noise_variance * Pose6::Identity());
+  for (std::size_t k = 0; k < covs.size(); ++k) {
+    const PoseFactor V(eq.V[k]);
+    V.solve(covs[k]);
+    if (eq.num_globals <= few) {
+      SmallGain gain = eq.coupling(k).transpose();
+      V.solve(gain);
+      const SmallGain by_cov = gain.lazyProduct(cov);
+      covs[k].noalias() += by_cov.lazyProduct(gain.transpose());
+    } else {
+      Eigen::Matrix<double, 6, Eigen::Dynamic> gain = eq.coupling(k).transpose();
+      V.solve(gain);
+      covs[k] += gain * cov * gain.transpose();
+    }
+  }
+  return covs;
 }
 
 BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config) {

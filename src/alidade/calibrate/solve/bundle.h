@@ -51,8 +51,7 @@ struct BundleResult {
   int iterations = 0;
   std::shared_ptr<const NormalEquations> equations;  ///< At which the last step started.
   // From here on: by with_covariance().
-  Eigen::MatrixXd cov;                                ///< Inverse of the reduced normal matrix.
-  std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One per view, if requested.
+  Eigen::MatrixXd cov;  ///< Inverse of the reduced normal matrix.
   /// Where the reduced matrix, scaled to unit diagonal, is (nearly) singular: the eigenvector of its smallest
   /// eigenvalue, which is what the views leave free.
   Eigen::VectorXd weakest;
@@ -68,12 +67,15 @@ struct BundleResult {
 /// with a corner that counts behind the fold; with more than a tenth of them there, the first result is kept.
 [[nodiscard]] BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config);
 
-/// The same with its covariances, from the undamped equations; status singular where they do not determine all.
+/// The same with its covariance, from the undamped equations; status singular where they do not determine all.
 /// Anything but a converged result is returned as it is.
-[[nodiscard]] BundleResult with_covariance(BundleResult result, bool want_pose_cov);
+[[nodiscard]] BundleResult with_covariance(BundleResult result);
 
-/// Raises the poses' covariances by what the lens' was raised: `extra` is added to that of the free lens parameters.
-void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result);
+/// Covariance of each view's pose, where whitened residuals have the variance s² and lens and shape the covariance
+/// `cov`: s² V⁻¹ + (V⁻¹ Wᵀ) cov (V⁻¹ Wᵀ)ᵀ.
+[[nodiscard]] std::vector<Eigen::Matrix<double, 6, 6>> pose_covariances(const BundleResult& result,
+                                                                        double noise_variance,
+                                                                        const Eigen::MatrixXd& cov);
 
 /// Residual (prediction − seen) [px] of every corner of a view, not whitened; NaN where it cannot be projected.
 [[nodiscard]] std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index,

@@ -98,7 +98,7 @@ BundleResult finished(BundleResult result, bool settled, const CalibrationWork& 
   constexpr double fits_px = 2.0;
   const bool creeps = !settled && (!is_central(result.state.lens) || sum < fits_px * fits_px * count);
   if (creeps && result.equations) result.status = BundleResult::Status::converged;
-  return with_covariance(std::move(result), true);
+  return with_covariance(std::move(result));
 }
 
 /// Looks for other minima where the views may have some, and settles in the least.

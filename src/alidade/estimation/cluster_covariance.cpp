@@ -39,7 +39,7 @@ struct Member {
   MatrixXd share;  ///< Empty where all members have the same, of the unit matrix.
   double trace;    ///< Of the share.
   VectorXd x;
-  VectorXd contradiction;  ///< The part of x along directions in which the cluster contradicts the others; empty: none.
+  VectorXd contradiction = {};  ///< The part of x along directions in which it contradicts the others; empty: none.
   std::optional<Principal> principal;  ///< Where the leverage is large.
 };
 
@@ -62,13 +62,27 @@ Principal principal_of(const MatrixXd& share, const MatrixXd* taken, const Vecto
   return principal;
 }
 
+/// (1 − m)^(−1/2) x, by its series to the third power: right to 5e-4 where the norm of m is below 0.2.
+class SmallLeverage {
+ public:
+  void raise(const MatrixXd& m, VectorXd& x) {
+    once_.noalias() = m * x;
+    twice_.noalias() = m * once_;
+    thrice_.noalias() = m * twice_;
+    x += 0.5 * once_ + 0.375 * twice_ + 0.3125 * thrice_;
+  }
+
+ private:
+  VectorXd once_, twice_, thrice_;  // kept from cluster to cluster
+};
+
 /// `cluster` is whitened; `equal_share` is that of one that brings none.
-Member member_of(ClusterStep&& cluster, double noise_variance, double equal_share) {
-  Member member{.share = std::move(cluster.spread), .trace = 0.0};
-  const VectorXd step = cluster.step / std::sqrt(noise_variance);
+Member member_of(ClusterStep&& cluster, double noise_variance, double equal_share, SmallLeverage& small_leverage) {
+  Member member{.share = std::move(cluster.spread), .trace = 0.0, .x = std::move(cluster.step)};
+  member.x /= std::sqrt(noise_variance);
   if (member.share.size() == 0) {
-    member.trace = equal_share * static_cast<double>(step.size());
-    member.x = step / std::sqrt(1.0 - equal_share);
+    member.trace = equal_share * static_cast<double>(member.x.size());
+    member.x /= std::sqrt(1.0 - equal_share);
     return member;
   }
   member.trace = member.share.trace();
@@ -76,13 +90,12 @@ Member member_of(ClusterStep&& cluster, double noise_variance, double equal_shar
   MatrixXd leverage;
   if (has_taken) leverage = member.share.ldlt().solve(cluster.taken).transpose();
   const MatrixXd& m = has_taken ? leverage : member.share;
-  constexpr double small = 0.2;  // of a norm, a bound of the leverage: the series below is right to 5e-4
+  constexpr double small = 0.2;  // of a norm, a bound of the leverage
   if (m.squaredNorm() < small * small) {
-    const VectorXd once = m * step, twice = m * once;
-    member.x = step + 0.5 * once + 0.375 * twice + 0.3125 * (m * twice);
+    small_leverage.raise(m, member.x);
     return member;
   }
-  member.principal = principal_of(member.share, has_taken ? &cluster.taken : nullptr, step);
+  member.principal = principal_of(member.share, has_taken ? &cluster.taken : nullptr, member.x);
   member.x = member.principal->along * member.principal->y;
   return member;
 }
@@ -245,8 +258,10 @@ void state_whitened(const MatrixXd& L, double noise_variance, std::vector<Cluste
   const bool equal_shares = clusters.front().spread.size() == 0;
   std::vector<Member> members;
   members.reserve(clusters.size());
+  const double equal_share = 1.0 / static_cast<double>(clusters.size());
+  SmallLeverage small_leverage;
   for (ClusterStep& cluster : clusters) {
-    members.push_back(member_of(std::move(cluster), noise_variance, 1.0 / static_cast<double>(clusters.size())));
+    members.push_back(member_of(std::move(cluster), noise_variance, equal_share, small_leverage));
     if (!members.back().x.allFinite()) return;
   }
   find_contradictions(members, n);

@@ -150,7 +150,7 @@ double degrees_of_freedom(const BundleProblem& problem) {
 BundleResult with_covariance(BundleResult result) {
   if (result.status != BundleResult::Status::converged) return result;
   const NormalEquations& eq = *result.equations;
-  const Reduced reduced = reduce(eq, 0.0);
+  Reduced reduced = reduce(eq, 0.0);
   if (!reduced.ok) {
     result.status = BundleResult::Status::singular;
     return result;
@@ -165,6 +165,7 @@ BundleResult with_covariance(BundleResult result) {
     return result;
   }
   result.cov = scale.asDiagonal() * *inverse * scale.asDiagonal();
+  result.pose_factors = std::make_shared<const std::vector<PoseFactor>>(std::move(reduced.factors));
   return result;
 }
 
@@ -174,7 +175,7 @@ std::vector<Pose6> pose_covariances(const BundleResult& result, double noise_var
   using SmallGain = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, few>;
   std::vector<Pose6> covs(eq.V.size(), noise_variance * Pose6::Identity());
   for (std::size_t k = 0; k < covs.size(); ++k) {
-    const PoseFactor V(eq.V[k]);
+    const PoseFactor& V = (*result.pose_factors)[k];
     V.solve(covs[k]);
     if (eq.num_globals <= few) {
       SmallGain gain = eq.coupling(k).transpose();

@@ -13,6 +13,7 @@
 namespace alidade {
 
 struct NormalEquations;
+class PoseFactor;
 
 /// What is estimated together: lens, poses, board points.
 struct BundleState {
@@ -51,7 +52,8 @@ struct BundleResult {
   int iterations = 0;
   std::shared_ptr<const NormalEquations> equations;  ///< At which the last step started.
   // From here on: by with_covariance().
-  Eigen::MatrixXd cov;  ///< Inverse of the reduced normal matrix.
+  Eigen::MatrixXd cov;                                          ///< Inverse of the reduced normal matrix.
+  std::shared_ptr<const std::vector<PoseFactor>> pose_factors;  ///< Of the equations' pose blocks.
   /// Where the reduced matrix, scaled to unit diagonal, is (nearly) singular: the eigenvector of its smallest
   /// eigenvalue, which is what the views leave free.
   Eigen::VectorXd weakest;

@@ -50,7 +50,7 @@ std::vector<ClusterStep> dense_steps(const BundleProblem& problem, const BundleR
     Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, most> rows(6, both);
     rows.leftCols(dense) = eq.coupling(view).transpose();
     rows.col(dense) = eq.pose_gradient[view];
-    PoseFactor(eq.V[view]).solve_lower(rows);
+    (*result.pose_factors)[view].solve_lower(rows);
     auto own = reduced.middleCols(k * both, both);
     own = eq.dense_of(view);
     own.noalias() -= rows.leftCols(dense).transpose().lazyProduct(rows);  // the pose follows
@@ -189,11 +189,12 @@ CornerSteps corner_steps(const BundleProblem& problem, const BundleResult& resul
     const auto corners = static_cast<Index>(view.size());
     fill_pulls(problem, columns, corners, by_lens, by_pose);
     follows = result.equations->coupling(k).transpose();
-    PoseFactor(result.equations->V[k]).solve(follows);  // the pose does
+    (*result.pose_factors)[k].solve(follows);  // the pose does
     auto pulls = by_lens.topRows(corners);
     pulls.noalias() -= by_pose.topRows(corners).lazyProduct(follows);
     add_scatter(pulls, scatter);
-    for (Index c = 0; c < corners; ++c) scores.row(view.index[static_cast<std::size_t>(c)]) += pulls.row(c);
+    for (Index j = 0; j < scores.cols(); ++j)
+      for (Index c = 0; c < corners; ++c) scores(view.index[static_cast<std::size_t>(c)], j) += pulls(c, j);
   }
   // Of an estimate from these views alone: what they share moves it as it moves that of all.
   const double scale = std::sqrt(static_cast<double>(num_views) / static_cast<double>(std::max<std::size_t>(1, count)));

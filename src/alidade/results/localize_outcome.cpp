@@ -11,6 +11,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/localize/path/path_error.h"
 #include "alidade/report/thin.h"
+#include "alidade/results/documents/number_columns.h"
 #include "alidade/results/thin_tables.h"
 #include "alidade/tables/localize_file.h"
 #include "alidade/tables/map_file.h"
@@ -19,86 +20,55 @@ namespace alidade {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr std::array<const char*, 7> pose_names{"x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"};
-
-std::array<double, 7> numbers_of(const Rigid3& world_from_cam) {
-  const Eigen::Vector3d& t = world_from_cam.translation;
-  const Eigen::Quaterniond& q = world_from_cam.rotation;
-  return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+NumberColumns path_columns(bool has_truth) {
+  NumberColumns columns{{"t_s", 6}};
+  columns.with_pose("world_from_cam", 7);
+  for (const char* part : {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"})
+    columns.with({{std::string("sigma_world_from_cam_") + part, 8}});
+  if (has_truth) columns.with_pose("truth", 7);
+  return columns.with({{"num_seen", 0}, {"num_tracked", 0}, {"num_gated", 0}, {"nis", 4}, {"seconds", 7}});
 }
 
 DataTable path_table(std::span<const PathStep> path, std::span<const TimedPose> truth) {
   std::vector<bool> must_keep;
   for (const PathStep& step : path)
     must_keep.push_back(step.event == FrameEvent::started || step.event == FrameEvent::restarted);
-  const auto rows = report::thinned_rows(path.size(), {}, must_keep, report::max_step_rows);
-  std::array<Numbers, 7> pose, truths;
-  std::array<Numbers, 6> sigmas;
-  Numbers t, tracked, gated, seen, nis, seconds;
+  NumberColumns columns = path_columns(!truth.empty());
   std::vector<std::string> events;
-  for (const std::size_t row : rows) {
+  for (const std::size_t row : report::thinned_rows(path.size(), {}, must_keep, report::max_step_rows)) {
     const PathStep& step = path[row];
-    const TimedPose* const there = nearest_pose(truth, step.t_s);
-    const std::array<double, 7> is = numbers_of(step.world_from_cam);
-    const std::array<double, 7> should = there ? numbers_of(there->world_from_cam) : std::array<double, 7>{};
-    for (std::size_t k = 0; k < 7; ++k) {
-      pose[k].push_back(step.has_pose() ? is[k] : missing_value);
-      truths[k].push_back(there ? should[k] : missing_value);
+    columns.add({step.t_s});
+    columns.add_pose(step.has_pose() ? &step.world_from_cam : nullptr);
+    for (Eigen::Index i = 0; i < 6; ++i) columns.add({step.has_pose() ? std::sqrt(step.cov(i, i)) : missing_value});
+    if (!truth.empty()) {
+      const TimedPose* const there = nearest_pose(truth, step.t_s);
+      columns.add_pose(there != nullptr ? &there->world_from_cam : nullptr);
     }
-    for (std::size_t k = 0; k < 6; ++k) {
-      const auto i = static_cast<Eigen::Index>(k);
-      sigmas[k].push_back(step.has_pose() ? std::sqrt(step.cov(i, i)) : missing_value);
-    }
-    t.push_back(step.t_s);
-    seen.push_back(static_cast<double>(step.num_seen));
-    tracked.push_back(static_cast<double>(step.num_tracked));
-    gated.push_back(static_cast<double>(step.num_gated));
-    nis.push_back(step.nis_per_dof);
-    seconds.push_back(step.seconds);
+    columns.add({static_cast<double>(step.num_seen), static_cast<double>(step.num_tracked),
+                 static_cast<double>(step.num_gated), step.nis_per_dof, step.seconds});
     events.emplace_back(event_name(step.event));
   }
-  DataTable table{"path", {{"t_s", rounded(t, 6)}}};
-  const auto add = [&](const std::string& name, Numbers values, int digits) {
-    table.columns.emplace_back(name, rounded(std::move(values), digits));
-  };
-  for (std::size_t k = 0; k < 7; ++k) add(std::string("world_from_cam_") + pose_names[k], std::move(pose[k]), 7);
-  constexpr std::array<const char*, 6> sigma_names{"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
-  for (std::size_t k = 0; k < 6; ++k)
-    add(std::string("sigma_world_from_cam_") + sigma_names[k], std::move(sigmas[k]), 8);
-  if (!truth.empty())
-    for (std::size_t k = 0; k < 7; ++k) add(std::string("truth_") + pose_names[k], std::move(truths[k]), 7);
-  add("num_seen", std::move(seen), 0);
-  add("num_tracked", std::move(tracked), 0);
-  add("num_gated", std::move(gated), 0);
-  add("nis", std::move(nis), 4);
-  add("seconds", std::move(seconds), 7);
+  DataTable table{"path", {}};
+  columns.append_to(table);
   table.columns.emplace_back("event", events);
   record_steps_kept(table, path.size(), "poses.csv");
   return table;
 }
 
 DataTable features_table(const Localization& result) {
-  constexpr std::array<const char*, 6> names{"xx", "xy", "xz", "yy", "yz", "zz"};
-  std::array<Numbers, 3> place;
-  std::array<Numbers, 6> cov;
+  NumberColumns columns{{"point_in_world_x_m", 7}, {"point_in_world_y_m", 7}, {"point_in_world_z_m", 7}};
+  columns.with_cov();
   std::vector<std::int64_t> ids, seen;
   std::vector<bool> known;
   for (const MapPoint& point : result.map) {
     ids.push_back(point.id);
     seen.push_back(static_cast<std::int64_t>(point.num_seen));
     known.push_back(point.is_known);
-    std::size_t at = 0;
-    for (int i = 0; i < 3; ++i) {
-      place[static_cast<std::size_t>(i)].push_back(point.point_in_world[i]);
-      for (int j = i; j < 3; ++j) cov[at++].push_back(point.cov(i, j));
-    }
+    columns.add(point.point_in_world);
+    columns.add_cov(point.cov);
   }
   DataTable table{"features", {{"id", ids}}};
-  constexpr std::array<const char*, 3> axes{"x_m", "y_m", "z_m"};
-  for (std::size_t k = 0; k < 3; ++k)
-    table.columns.emplace_back(std::string("point_in_world_") + axes[k], rounded(std::move(place[k]), 7));
-  for (std::size_t k = 0; k < 6; ++k)
-    table.columns.emplace_back(std::string("cov_") + names[k] + "_m2", std::move(cov[k]));
+  columns.append_to(table);
   table.columns.emplace_back("num_seen", seen);
   table.columns.emplace_back("known", known);
   return table;

@@ -9,6 +9,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/report/thin.h"
 #include "alidade/results/documents/heads_document.h"
+#include "alidade/results/documents/number_columns.h"
 #include "alidade/results/thin_tables.h"
 #include "alidade/tables/events_file.h"
 
@@ -37,25 +38,9 @@ JsonValue camera_value(const LocatedCamera& camera) {
 /// The position of each located camera, with its covariance in the world, and half its view (tangents), to
 /// draw it by.
 DataTable cameras_table(const MovingTargetReport& report) {
-  constexpr std::array<const char*, 18> columns{"id",
-                                                "world_from_cam_x_m",
-                                                "world_from_cam_y_m",
-                                                "world_from_cam_z_m",
-                                                "world_from_cam_qx",
-                                                "world_from_cam_qy",
-                                                "world_from_cam_qz",
-                                                "world_from_cam_qw",
-                                                "cov_xx_m2",
-                                                "cov_xy_m2",
-                                                "cov_xz_m2",
-                                                "cov_yy_m2",
-                                                "cov_yz_m2",
-                                                "cov_zz_m2",
-                                                "half_view_x",
-                                                "half_view_y",
-                                                "num_used",
-                                                "rms_px"};
-  std::array<Numbers, columns.size()> cells;
+  NumberColumns columns{{"id"}};
+  columns.with_pose("world_from_cam").with_cov();
+  columns.with({{"half_view_x"}, {"half_view_y"}, {"num_used"}, {"rms_px"}});
   for (std::size_t h = 0; h < report.cameras.size(); ++h) {
     if (!report.cameras[h].placed) continue;
     const RigHead& head = report.rig.heads[h];
@@ -63,34 +48,17 @@ DataTable cameras_table(const MovingTargetReport& report) {
     const Rigid3& base = head.head.world_from_base;
     const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
     const Eigen::Matrix3d R = base.rotation.toRotationMatrix();
-    const Eigen::Matrix3d cov = R * report.rig.cov.block<3, 3>(at, at) * R.transpose();
     // It does not rotate: its axes stand where the encoder is at zero.
     const Rigid3 cam = world_from_cam(head.head, head.head.encoder.readings(Eigen::Vector2d::Zero()));
-    const Eigen::Vector3d& t = cam.translation;
-    const Eigen::Quaterniond& q = cam.rotation;
     const Eigen::VectorXd lens = params(head.camera.lens);  // the first two of any: fx, fy
-    const std::array<double, columns.size()> row{static_cast<double>(report.cameras[h].id),
-                                                 t.x(),
-                                                 t.y(),
-                                                 t.z(),
-                                                 q.x(),
-                                                 q.y(),
-                                                 q.z(),
-                                                 q.w(),
-                                                 cov(0, 0),
-                                                 cov(0, 1),
-                                                 cov(0, 2),
-                                                 cov(1, 1),
-                                                 cov(1, 2),
-                                                 cov(2, 2),
-                                                 0.5 * head.camera.width_px / lens[0],
-                                                 0.5 * head.camera.height_px / lens[1],
-                                                 static_cast<double>(report.cameras[h].num_used),
-                                                 report.cameras[h].rms_px};
-    for (std::size_t i = 0; i < row.size(); ++i) cells[i].push_back(row[i]);
+    columns.add({static_cast<double>(report.cameras[h].id)});
+    columns.add_pose(&cam);
+    columns.add_cov(R * report.rig.cov.block<3, 3>(at, at) * R.transpose());
+    columns.add({0.5 * head.camera.width_px / lens[0], 0.5 * head.camera.height_px / lens[1],
+                 static_cast<double>(report.cameras[h].num_used), report.cameras[h].rms_px});
   }
   DataTable table{"cameras", {}};
-  for (std::size_t i = 0; i < columns.size(); ++i) table.columns.emplace_back(columns[i], cells[i]);
+  columns.append_to(table);
   return table;
 }
 

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/imaging/image_codecs.h"
+#include "alidade/results/documents/number_columns.h"
 
 namespace alidade {
 namespace {
@@ -54,34 +55,28 @@ std::string overlay_png(const cv::Mat& photo, const Beam& beam, const Camera& ca
 }
 
 DataTable points_table(const std::vector<ProjectedReading>& projected) {
-  std::vector<std::vector<double>> column(15);
+  NumberColumns columns{{"range_m"},
+                        {"u_px"},
+                        {"v_px"},
+                        {"cov_uu_px2"},
+                        {"cov_uv_px2"},
+                        {"cov_vv_px2"},
+                        {"point_in_cam_x_m"},
+                        {"point_in_cam_y_m"},
+                        {"point_in_cam_z_m"}};
+  columns.with_cov();
   for (const ProjectedReading& one : projected) {
-    const Eigen::Vector3d& p = one.point.point_in_cam;
-    const Eigen::Matrix3d& c = one.point.cov;
-    const double none = std::nan("");
-    const Eigen::Vector2d px = one.pixel ? one.pixel->px : Eigen::Vector2d(none, none);
-    const Eigen::Matrix2d s = one.pixel ? one.pixel->cov : Eigen::Matrix2d(Eigen::Matrix2d::Constant(none));
-    const std::array<double, 15> values{one.range_m, px.x(),  px.y(),  s(0, 0), s(0, 1), s(1, 1), p.x(),  p.y(),
-                                        p.z(),       c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
-    for (std::size_t i = 0; i < values.size(); ++i) column[i].push_back(values[i]);
+    columns.add({one.range_m});
+    if (one.pixel)
+      columns.add(
+          {one.pixel->px.x(), one.pixel->px.y(), one.pixel->cov(0, 0), one.pixel->cov(0, 1), one.pixel->cov(1, 1)});
+    else
+      columns.add_missing(5);
+    columns.add(one.point.point_in_cam);
+    columns.add_cov(one.point.cov);
   }
-  static const std::array<const char*, 15> names{"range_m",
-                                                 "u_px",
-                                                 "v_px",
-                                                 "cov_uu_px2",
-                                                 "cov_uv_px2",
-                                                 "cov_vv_px2",
-                                                 "point_in_cam_x_m",
-                                                 "point_in_cam_y_m",
-                                                 "point_in_cam_z_m",
-                                                 "cov_xx_m2",
-                                                 "cov_xy_m2",
-                                                 "cov_xz_m2",
-                                                 "cov_yy_m2",
-                                                 "cov_yz_m2",
-                                                 "cov_zz_m2"};
   DataTable table{"points", {}};
-  for (std::size_t i = 0; i < names.size(); ++i) table.columns.emplace_back(names[i], column[i]);
+  columns.append_to(table);
   return table;
 }
 

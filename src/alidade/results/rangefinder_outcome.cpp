@@ -13,6 +13,7 @@
 #include "alidade/formats/camera_file.h"
 #include "alidade/formats/camera_json.h"
 #include "alidade/images/photos.h"
+#include "alidade/results/documents/number_columns.h"
 #include "alidade/results/documents/sigma_values.h"
 
 namespace alidade {
@@ -24,83 +25,59 @@ DataTable shots_table(const RangefinderCalibration& report) {
   const std::vector<Shot>& shots = report.measured;
   std::vector<std::string> name, reason;
   std::vector<bool> used;
-  std::vector<Numbers> column(14);
+  NumberColumns columns{{"range_m", 6},
+                        {"residual_range_m", 6},
+                        {"sigma_residual_range_m", 6},
+                        {"u_px", 5},
+                        {"v_px", 5},
+                        {"residual_u_px", 5},
+                        {"residual_v_px", 5},
+                        {"sigma_residual_u_px", 5},
+                        {"sigma_residual_v_px", 5},
+                        {"cov_residual_uv_px2", 5},
+                        {"point_in_cam_x_m", 5},
+                        {"point_in_cam_y_m", 5},
+                        {"point_in_cam_z_m", 5},
+                        {"cluster_z2", 5}};
   for (std::size_t i = 0; i < shots.size(); ++i) {
     const ShotFit& fit = report.shots[i];
     name.push_back(shots[i].name);
     used.push_back(fit.used);
     reason.push_back(fit.reason);
-    const bool has_spot = shots[i].spot.has_value() && fit.cov_px(0, 0) > 0.0;
-    const std::array<double, 14> values{shots[i].range_m,
-                                        fit.residual_range_m,
-                                        fit.sigma_range_m,
-                                        shots[i].spot ? shots[i].spot->px.x() : missing_value,
-                                        shots[i].spot ? shots[i].spot->px.y() : missing_value,
-                                        fit.residual_px.x(),
-                                        fit.residual_px.y(),
-                                        has_spot ? std::sqrt(fit.cov_px(0, 0)) : missing_value,
-                                        has_spot ? std::sqrt(fit.cov_px(1, 1)) : missing_value,
-                                        has_spot ? fit.cov_px(0, 1) : missing_value,
-                                        fit.point_in_cam.x(),
-                                        fit.point_in_cam.y(),
-                                        fit.point_in_cam.z(),
-                                        fit.cluster_z2};
-    for (std::size_t k = 0; k < values.size(); ++k) column[k].push_back(values[k]);
+    columns.add({shots[i].range_m, fit.residual_range_m, fit.sigma_range_m});
+    if (shots[i].spot)
+      columns.add({shots[i].spot->px.x(), shots[i].spot->px.y()});
+    else
+      columns.add_missing(2);
+    columns.add({fit.residual_px.x(), fit.residual_px.y()});
+    if (shots[i].spot.has_value() && fit.cov_px(0, 0) > 0.0)
+      columns.add({std::sqrt(fit.cov_px(0, 0)), std::sqrt(fit.cov_px(1, 1)), fit.cov_px(0, 1)});
+    else
+      columns.add_missing(3);
+    columns.add(fit.point_in_cam);
+    columns.add({fit.cluster_z2});
   }
-  static const std::array<const char*, 14> names{"range_m",
-                                                 "residual_range_m",
-                                                 "sigma_residual_range_m",
-                                                 "u_px",
-                                                 "v_px",
-                                                 "residual_u_px",
-                                                 "residual_v_px",
-                                                 "sigma_residual_u_px",
-                                                 "sigma_residual_v_px",
-                                                 "cov_residual_uv_px2",
-                                                 "point_in_cam_x_m",
-                                                 "point_in_cam_y_m",
-                                                 "point_in_cam_z_m",
-                                                 "cluster_z2"};
   DataTable table{"shots", {{"name", name}, {"used", used}, {"reason", reason}}};
-  for (std::size_t k = 0; k < names.size(); ++k)
-    table.columns.emplace_back(names[k], rounded(column[k], k < 3 ? 6 : 5));
+  columns.append_to(table);
   return table;
 }
 
 /// Planes of the boards, and where a board's pose is known its corner 0 and axes: enough to draw it.
 DataTable planes_table(const RangefinderCalibration& report) {
-  const std::vector<Shot>& shots = report.measured;
+  constexpr int digits = 8;
   std::vector<std::string> name;
-  std::vector<Numbers> column(11);
-  for (std::size_t i = 0; i < shots.size(); ++i) {
+  NumberColumns columns{{"nx", digits}, {"ny", digits}, {"nz", digits}, {"d_m", digits}};
+  columns.with_pose("cam_from_board", digits);
+  for (std::size_t i = 0; i < report.measured.size(); ++i) {
     const ShotFit& fit = report.shots[i];
     if (!fit.plane) continue;
-    name.push_back(shots[i].name);
-    const Eigen::Vector3d& n = fit.plane->normal_in_cam;
-    std::array<double, 11> values{n.x(), n.y(), n.z(), fit.plane->d_m};
-    std::fill(values.begin() + 4, values.end(), missing_value);
-    if (fit.pose) {
-      const Rigid3& pose = fit.pose->cam_from_board;
-      const Eigen::Quaterniond& q = pose.rotation;
-      const Eigen::Vector3d& t = pose.translation;
-      const std::array<double, 7> posed{t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
-      std::copy(posed.begin(), posed.end(), values.begin() + 4);
-    }
-    for (std::size_t k = 0; k < values.size(); ++k) column[k].push_back(values[k]);
+    name.push_back(report.measured[i].name);
+    columns.add(fit.plane->normal_in_cam);
+    columns.add({fit.plane->d_m});
+    columns.add_pose(fit.pose ? &fit.pose->cam_from_board : nullptr);
   }
-  static const std::array<const char*, 11> names{"nx",
-                                                 "ny",
-                                                 "nz",
-                                                 "d_m",
-                                                 "cam_from_board_x_m",
-                                                 "cam_from_board_y_m",
-                                                 "cam_from_board_z_m",
-                                                 "cam_from_board_qx",
-                                                 "cam_from_board_qy",
-                                                 "cam_from_board_qz",
-                                                 "cam_from_board_qw"};
   DataTable table{"planes", {{"name", name}}};
-  for (std::size_t k = 0; k < names.size(); ++k) table.columns.emplace_back(names[k], rounded(column[k], 8));
+  columns.append_to(table);
   return table;
 }
 

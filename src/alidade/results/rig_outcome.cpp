@@ -11,6 +11,7 @@
 #include "alidade/files/number_list.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/results/documents/heads_document.h"
+#include "alidade/results/documents/number_columns.h"
 
 namespace alidade {
 namespace {
@@ -33,13 +34,10 @@ JsonValue covers_value(const RigReport& report) {
 }
 
 void add_pose(DataTable& table, const std::string& name, const std::vector<Rigid3>& poses) {
-  static constexpr std::array<const char*, 7> parts{"_x_m", "_y_m", "_z_m", "_qx", "_qy", "_qz", "_qw"};
-  for (std::size_t k = 0; k < parts.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k < 3 ? k : k - 3);
-    Numbers values;
-    for (const Rigid3& pose : poses) values.push_back(k < 3 ? pose.translation[at] : pose.rotation.coeffs()[at]);
-    table.columns.emplace_back(name + parts[k], rounded(std::move(values), 6));
-  }
+  NumberColumns columns{};
+  columns.with_pose(name, 6);
+  for (const Rigid3& pose : poses) columns.add_pose(&pose);
+  columns.append_to(table);
 }
 
 const Head* head_of(const Rig& rig, int id) {
@@ -118,12 +116,23 @@ DataTable corners_table(const RigCalibration& report) {
            {"residual_v_px", rounded(std::move(columns[3]), 4)}}};
 }
 
+std::vector<Rigid3> poses_of(const Rig& rig, const std::vector<HeadView>& views) {
+  std::vector<Rigid3> world_from_cams;
+  for (const HeadView& view : views) {
+    const Head* const turned = head_of(rig, view.head);
+    world_from_cams.push_back(turned ? world_from_cam(*turned, view.pan_tilt_rad) : Rigid3());
+  }
+  return world_from_cams;
+}
+
 DataTable views_table(const RigCalibration& report) {
   const std::vector<HeadView>& views = report.measured;
   std::vector<std::string> name, reason;
   std::vector<int> head, board;
   std::vector<bool> used;
-  Numbers pan, tilt, rms, pan_off, tilt_off, z2;
+  NumberColumns columns{
+      {"pan_rad"},      {"tilt_rad"}, {"rms_px", 5}, {"pan_correction_rad", 8}, {"tilt_correction_rad", 8},
+      {"cluster_z2", 4}};
   for (std::size_t v = 0; v < views.size(); ++v) {
     const HeadViewFit& fit = report.views[v];
     name.push_back(views[v].seen.photo);
@@ -131,32 +140,15 @@ DataTable views_table(const RigCalibration& report) {
     head.push_back(views[v].head);
     board.push_back(views[v].board);
     used.push_back(fit.used);
-    pan.push_back(views[v].pan_tilt_rad.x());
-    tilt.push_back(views[v].pan_tilt_rad.y());
-    rms.push_back(fit.residual_px.empty() ? std::numeric_limits<double>::quiet_NaN() : fit.rms_px);
-    pan_off.push_back(fit.reading_correction_rad.x());
-    tilt_off.push_back(fit.reading_correction_rad.y());
-    z2.push_back(fit.used ? fit.cluster_z2 : std::numeric_limits<double>::quiet_NaN());
+    columns.add({views[v].pan_tilt_rad.x(), views[v].pan_tilt_rad.y(),
+                 fit.residual_px.empty() ? missing_value : fit.rms_px, fit.reading_correction_rad.x(),
+                 fit.reading_correction_rad.y(), fit.used ? fit.cluster_z2 : missing_value});
   }
-  DataTable table{"views",
-                  {{"name", name},
-                   {"head", head},
-                   {"board", board},
-                   {"used", used},
-                   {"reason", reason},
-                   {"pan_rad", pan},
-                   {"tilt_rad", tilt},
-                   {"rms_px", rounded(rms, 5)},
-                   {"pan_correction_rad", rounded(pan_off, 8)},
-                   {"tilt_correction_rad", rounded(tilt_off, 8)},
-                   {"cluster_z2", rounded(z2, 4)},
-                   {"travel_sign", travel_signs(views)}}};
+  DataTable table{"views", {{"name", name}, {"head", head}, {"board", board}, {"used", used}, {"reason", reason}}};
+  columns.append_to(table);
+  table.columns.emplace_back("travel_sign", travel_signs(views));
   if (report.status != RigReport::Status::converged) return table;
-  std::vector<Rigid3> world_from_cams;
-  for (const HeadView& view : views) {
-    const Head* const turned = head_of(report.rig, view.head);
-    world_from_cams.push_back(turned ? world_from_cam(*turned, view.pan_tilt_rad) : Rigid3());
-  }
+  const std::vector<Rigid3> world_from_cams = poses_of(report.rig, views);
   add_pose(table, "world_from_cam", world_from_cams);
   add_pose(table, "base_from_cam", world_from_cams);  // the same by the name of earlier versions
   return table;

@@ -10,36 +10,22 @@
 #include "alidade/formats/camera_json.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/results/documents/calibration_document.h"
+#include "alidade/results/documents/number_columns.h"
 
 namespace alidade {
 namespace {
 
 DataTable planned_shots_table(const std::vector<NextShot>& shots) {
-  std::vector<std::vector<double>> columns(13);
+  NumberColumns columns{{"distance_m"},          {"tilt_rad"},     {"azimuth_rad"}, {"sigma_origin_m"},
+                        {"sigma_direction_rad"}, {"spot_sigma_px"}};
+  columns.with_pose("cam_from_board");
   for (const NextShot& shot : shots) {
-    const Eigen::Vector3d& t = shot.cam_from_board.translation;
-    const Eigen::Quaterniond& q = shot.cam_from_board.rotation;
-    const std::array<double, 13> values{shot.distance_m,
-                                        shot.tilt_rad,
-                                        shot.azimuth_rad,
-                                        shot.sigma_origin_m,
-                                        shot.sigma_direction_rad,
-                                        shot.spot_sigma_px,
-                                        t.x(),
-                                        t.y(),
-                                        t.z(),
-                                        q.x(),
-                                        q.y(),
-                                        q.z(),
-                                        q.w()};
-    for (std::size_t i = 0; i < values.size(); ++i) columns[i].push_back(values[i]);
+    columns.add({shot.distance_m, shot.tilt_rad, shot.azimuth_rad, shot.sigma_origin_m, shot.sigma_direction_rad,
+                 shot.spot_sigma_px});
+    columns.add_pose(&shot.cam_from_board);
   }
-  static const std::array<const char*, 13> names{
-      "distance_m",        "tilt_rad",           "azimuth_rad",        "sigma_origin_m",     "sigma_direction_rad",
-      "spot_sigma_px",     "cam_from_board_x_m", "cam_from_board_y_m", "cam_from_board_z_m", "cam_from_board_qx",
-      "cam_from_board_qy", "cam_from_board_qz",  "cam_from_board_qw"};
   DataTable table{"next", {}};
-  for (std::size_t i = 0; i < names.size(); ++i) table.columns.emplace_back(names[i], columns[i]);
+  columns.append_to(table);
   return table;
 }
 

@@ -7,6 +7,7 @@
 #include "alidade/calibrate/solve/port.h"
 #include "alidade/formats/camera_json.h"
 #include "alidade/geometry/so3.h"
+#include "alidade/results/documents/number_columns.h"
 #include "alidade/results/documents/sigma_values.h"
 
 namespace alidade {
@@ -22,43 +23,13 @@ Eigen::Vector3d centre_of(const std::vector<Eigen::Vector3d>& points) {
   return sum / static_cast<double>(points.size());
 }
 
-/// Seven columns of a pose: x y z in metres, then the quaternion.
-struct PoseColumns {
-  std::array<Numbers, 7> values;
-  void add(const Rigid3* pose) {
-    const double none = std::nan("");
-    for (int i = 0; i < 3; ++i) {
-      values[static_cast<std::size_t>(i)].push_back(pose ? pose->translation[i] : none);
-    }
-    for (int i = 0; i < 4; ++i) {  // x y z w
-      values[static_cast<std::size_t>(3 + i)].push_back(pose ? pose->rotation.coeffs()[i] : none);
-    }
-  }
-  void append_to(DataTable& table, const std::string& name) const {
-    static const std::array<const char*, 7> endings = {"_x_m", "_y_m", "_z_m", "_qx", "_qy", "_qz", "_qw"};
-    for (std::size_t i = 0; i < 7; ++i) table.columns.emplace_back(name + endings[i], values[i]);
-  }
-};
-
-/// Covariance of a board's centre in the camera's frame, six columns: the pose's, carried there.
-struct CentreColumns {
-  Eigen::Vector3d centre_in_board;
-  std::array<Numbers, 6> values;
-  void add(const ViewFit& fit) {
-    Eigen::Matrix<double, 3, 6> J;
-    J << Eigen::Matrix3d::Identity(), -cross_matrix(centre_in_board);
-    J = fit.cam_from_board.rotation.toRotationMatrix() * J;
-    const Eigen::Matrix3d cov = J * fit.pose_cov * J.transpose();
-    std::size_t at = 0;
-    for (int i = 0; i < 3; ++i)
-      for (int j = i; j < 3; ++j) values[at++].push_back(fit.used ? cov(i, j) : std::nan(""));
-  }
-  void append_to(DataTable& table) const {
-    static const std::array<const char*, 6> names = {"xx", "xy", "xz", "yy", "yz", "zz"};
-    for (std::size_t i = 0; i < 6; ++i)
-      table.columns.emplace_back(std::string("cov_middle_") + names[i] + "_m2", values[i]);
-  }
-};
+/// Covariance of a board's centre in the camera's frame: the pose's, carried there.
+Eigen::Matrix3d cov_of_centre(const ViewFit& fit, const Eigen::Vector3d& centre_in_board) {
+  Eigen::Matrix<double, 3, 6> J;
+  J << Eigen::Matrix3d::Identity(), -cross_matrix(centre_in_board);
+  J = fit.cam_from_board.rotation.toRotationMatrix() * J;
+  return J * fit.pose_cov * J.transpose();
+}
 
 DataTable photos_table(const Board& board, const Calibration& calibration) {
   const auto& views = calibration.board_views;
@@ -68,8 +39,9 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
   std::vector<int> num_corners;
   Numbers rms, z2;
   std::size_t cluster = 0;
-  PoseColumns poses;
-  CentreColumns centres{centre_of(points_in_board(board)), {}};
+  NumberColumns poses{};
+  poses.with_pose("cam_from_board").with_cov("cov_middle_");
+  const Eigen::Vector3d centre_in_board = centre_of(points_in_board(board));
   for (std::size_t k = 0; k < views.size(); ++k) {
     const ViewFit& fit = report.views[k];
     names.push_back(views[k].photo);
@@ -79,8 +51,11 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
     rms.push_back(fit.used ? fit.rms_px : std::nan(""));
     const bool has_score = fit.used && cluster < report.clusters.z2.size();
     z2.push_back(has_score ? report.clusters.z2[cluster++] : std::nan(""));
-    poses.add(fit.used ? &fit.cam_from_board : nullptr);
-    centres.add(fit);
+    poses.add_pose(fit.used ? &fit.cam_from_board : nullptr);
+    if (fit.used)
+      poses.add_cov(cov_of_centre(fit, centre_in_board));
+    else
+      poses.add_missing(6);
   }
   DataTable table{"photos",
                   {{"name", names},
@@ -89,8 +64,7 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
                    {"num_corners", num_corners},
                    {"rms_px", rms},
                    {"cluster_z2", z2}}};
-  poses.append_to(table, "cam_from_board");
-  centres.append_to(table);
+  poses.append_to(table);
   return table;
 }
 
@@ -319,14 +293,15 @@ JsonValue rejected_corners(const Calibration& calibration) {
 }  // namespace
 
 DataTable next_photos_table(const NextPhotoPlan& next) {
-  PoseColumns poses;
+  NumberColumns poses{};
+  poses.with_pose("cam_from_board");
   Numbers worst;
   for (const NextPhoto& photo : next.photos) {
-    poses.add(&photo.cam_from_board);
+    poses.add_pose(&photo.cam_from_board);
     worst.push_back(photo.worst_3sigma_px);
   }
   DataTable table{"next", {}};
-  poses.append_to(table, "cam_from_board");
+  poses.append_to(table);
   table.columns.emplace_back("worst_3sigma_px", worst);
   return table;
 }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "alidade/report/thin.h"
+#include "alidade/results/documents/number_columns.h"
 #include "alidade/results/thin_tables.h"
 #include "alidade/track/track.h"
 
@@ -71,41 +72,38 @@ DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::sp
   return table;
 }
 
+NumberColumns measurement_columns() {
+  return {{"t_capture_s", 6},
+          {"t_arrival_s", 6},
+          {"pan_rad", 6},
+          {"tilt_rad", 6},
+          {"u_px", 4},
+          {"v_px", 4},
+          {"innovation_u_px", 4},
+          {"innovation_v_px", 4},
+          {"sigma_innovation_u_px", 4},
+          {"sigma_innovation_v_px", 4},
+          {"nis", 4},
+          {"head", 4}};
+}
+
 DataTable measurements_table(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                              const TrackReport& report, std::span<const std::size_t> rows) {
-  constexpr std::array<const char*, 12> names{"t_capture_s",
-                                              "t_arrival_s",
-                                              "pan_rad",
-                                              "tilt_rad",
-                                              "u_px",
-                                              "v_px",
-                                              "innovation_u_px",
-                                              "innovation_v_px",
-                                              "sigma_innovation_u_px",
-                                              "sigma_innovation_v_px",
-                                              "nis",
-                                              "head"};
-  std::array<Numbers, names.size()> column;
+  NumberColumns columns = measurement_columns();
   ByAxis origin_in_world, direction_in_world;
   std::vector<bool> accepted;
   for (const std::size_t row : rows) {
     const TargetObservation& observation = observations[row];
     const TrackStep& step = report.steps[row];
     const Innovation& innovation = step.innovation;
-    const auto if_there = [&](double value) { return step.has_innovation ? value : missing_value; };
-    const std::array<double, names.size()> values{observation.t_capture_s,
-                                                  observation.t_arrival_s,
-                                                  observation.pan_tilt_rad.x(),
-                                                  observation.pan_tilt_rad.y(),
-                                                  observation.px.x(),
-                                                  observation.px.y(),
-                                                  if_there(innovation.nu.x()),
-                                                  if_there(innovation.nu.y()),
-                                                  if_there(std::sqrt(innovation.S(0, 0))),
-                                                  if_there(std::sqrt(innovation.S(1, 1))),
-                                                  if_there(innovation.nis),
-                                                  static_cast<double>(heads[observation.head].head.id)};
-    for (std::size_t k = 0; k < names.size(); ++k) column[k].push_back(values[k]);
+    columns.add({observation.t_capture_s, observation.t_arrival_s, observation.pan_tilt_rad.x(),
+                 observation.pan_tilt_rad.y(), observation.px.x(), observation.px.y()});
+    if (step.has_innovation)
+      columns.add({innovation.nu.x(), innovation.nu.y(), std::sqrt(innovation.S(0, 0)), std::sqrt(innovation.S(1, 1)),
+                   innovation.nis});
+    else
+      columns.add_missing(5);
+    columns.add({static_cast<double>(heads[observation.head].head.id)});
     accepted.push_back(step.accepted);
     const auto ray = ray_in_world(heads[observation.head], observation);
     for (int i = 0; i < 3; ++i) {
@@ -114,8 +112,7 @@ DataTable measurements_table(std::span<const TargetObservation> observations, st
     }
   }
   DataTable table{"measurements", {}};
-  for (std::size_t k = 0; k < names.size(); ++k)
-    table.columns.emplace_back(names[k], rounded(std::move(column[k]), k < 4 ? 6 : 4));
+  columns.append_to(table);
   table.columns.emplace_back("accepted", accepted);
   add_by_axis(table, "ray_origin_in_world_", "_m", std::move(origin_in_world));
   add_by_axis(table, "ray_direction_", "", std::move(direction_in_world));

@@ -39,4 +39,10 @@ namespace alidade::cli {
   return checked_number(fault, fmt::format("NUMBER in [{:g} - {:g}]", low, high));
 }
 
+/// An option with a number of such limits; its default is shown.
+inline CLI::Option* add_number(CLI::App& command, const char* name, double& value, const char* help, double low,
+                               double high) {
+  return command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
+}
+
 }  // namespace alidade::cli

@@ -136,19 +136,17 @@ void add_board_scenario(App& app) {
   command.add_option("--camera", args->camera_file, "The true camera; without it one is made up")->type_name("FILE");
   command.add_option("--model", args->model, "Lens of the made-up camera")->type_name("NAME")->capture_default_str();
   command.add_option("--size", args->size, "Image of the made-up camera")->type_name("WxH")->capture_default_str();
-  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
-  };
-  number("--max-tilt-deg", args->max_tilt_deg, "Largest tilt of the board", 0.0, 80.0);
-  number("--bow-mm", args->bow_mm, "Height of the board's centre over its corners", -1000.0, 1000.0);
-  number("--shape-sigma-mm", args->shape_sigma_mm, "Scatter of the board's points about their plan", 0.0, 1000.0);
-  number("--blur", args->blur_px, "Sigma of the optical blur [px]", 0.0, 20.0);
-  number("--noise", args->noise, "Sigma of the grey noise, of 255", 0.0, 100.0);
-  number("--sigma-px", args->sigma_px, "Sigma of the corners in corners.csv", 0.0, 100.0);
-  number("--shared-px", args->shared_px,
-         "Errors in corners.csv that the corners of a photo share: sigma of each term of "
-         "a smooth field",
-         0.0, 100.0);
+  add_number(command, "--max-tilt-deg", args->max_tilt_deg, "Largest tilt of the board", 0.0, 80.0);
+  add_number(command, "--bow-mm", args->bow_mm, "Height of the board's centre over its corners", -1000.0, 1000.0);
+  add_number(command, "--shape-sigma-mm", args->shape_sigma_mm, "Scatter of the board's points about their plan", 0.0,
+             1000.0);
+  add_number(command, "--blur", args->blur_px, "Sigma of the optical blur [px]", 0.0, 20.0);
+  add_number(command, "--noise", args->noise, "Sigma of the grey noise, of 255", 0.0, 100.0);
+  add_number(command, "--sigma-px", args->sigma_px, "Sigma of the corners in corners.csv", 0.0, 100.0);
+  add_number(command, "--shared-px", args->shared_px,
+             "Errors in corners.csv that the corners of a photo share: sigma of each term of "
+             "a smooth field",
+             0.0, 100.0);
   command.add_flag("--corners-only", args->corners_only, "No photos");
 }
 

@@ -122,6 +122,45 @@ ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   return run.finish(verdict);
 }
 
+/// What of the readings and the camera file is not right.
+void add_mistakes(CLI::App& command, SimulateRangefinderArgs& args) {
+  add_number(command, "--offset-m", args.mistake.offset_m, "What each reading is too long by [m]", -1.0, 1.0);
+  add_number(command, "--focal-error", args.mistake.focal, "Share by which the camera file's focal length is too long",
+             -0.5, 0.5);
+  add_number(command, "--centre-error", args.mistake.centre_px, "Error of its centre in u and v [px]", -1e3, 1e3);
+  add_number(command, "--k1-error", args.mistake.k1, "What its k1 is too large by", -1.0, 1.0);
+  add_number(command, "--drift-m", args.mistake.drift_m,
+             "What the readings drift by from the first shot to the last [m]", -1.0, 1.0);
+  add_number(command, "--bend-m", args.mistake.bend_m, "Curvature of the readings: too long by this 1 m from 2 m [m]",
+             -1.0, 1.0);
+  add_number(command, "--wander-px", args.mistake.wander_px, "What the spots move by from the first shot to the last",
+             -1e3, 1e3);
+  command.add_flag("--exchange-uv", args.mistake.exchange_uv, "u and v of the spots are exchanged");
+  command.add_option("--unit", args.unit, "Of the readings in the table")
+      ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))
+      ->capture_default_str();
+  command.add_option("--shift-rows", args.mistake.shift_rows, "Ranges are this many rows late")
+      ->check(CLI::Range(-100, 100))
+      ->capture_default_str();
+}
+
+/// Photos instead of spots and corners, and how they look.
+void add_photo_options(CLI::App& command, SimulateRangefinderArgs& args) {
+  add_number(command, "--speckle", args.speckle, "With --photos: contrast of the laser's speckle, 1 is full", 0.0, 1.0);
+  command.add_flag("--bayer", args.bayer, "With --photos: one colour a pixel, the others interpolated");
+  command.add_option("--jpeg", args.jpeg, "With --photos: compressed with this quality, 0: not")
+      ->check(CLI::Range(0, 100))
+      ->capture_default_str();
+  command.add_option("--stickers", args.stickers, "With --photos: red spots on the board that are not the laser's")
+      ->check(CLI::Range(0, 10))
+      ->capture_default_str();
+  command.add_flag("--photos", args.photos, "Render the photos instead of spots and corners");
+  command.add_flag("--photos-off", args.photos_off, "With --photos: each also with the laser off");
+  command.add_option("--laser", args.laser, "Colour of the laser in photos: red or green")
+      ->check(CLI::IsMember({"red", "green"}))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_rangefinder_scenario(App& app) {
@@ -138,44 +177,15 @@ void add_rangefinder_scenario(App& app) {
       ->capture_default_str();
   command.add_option("--shots", args->shots, "How many shots")->check(CLI::Range(1, 10000))->capture_default_str();
   command.add_option("--camera", args->camera, "The true camera; without it one is made up")->type_name("FILE");
-  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
-  };
-  number("--sigma-range-m", args->sigma_range_m, "Noise of a reading [m]", 0.0, 1.0);
-  number("--sigma-px", args->noise.sigma_spot_px, "Noise of a spot's coordinate", 0.0, 100.0);
-  number("--sigma-corner-px", args->noise.sigma_corner_px, "Noise of a corner's coordinate", 0.0, 100.0);
-  number("--outliers", args->noise.outlier_share, "Share of shots whose beam passed the board", 0.0, 0.9);
-  number("--scale", args->scale, "Metres for each metre read", 0.5, 2.0);
-  number("--sigma-px-near", args->noise.sigma_spot_near_px, "Noise of a spot at 1 m beyond that; falls with the range",
-         0.0, 100.0);
-  number("--offset-m", args->mistake.offset_m, "What each reading is too long by [m]", -1.0, 1.0);
-  number("--focal-error", args->mistake.focal, "Share by which the camera file's focal length is too long", -0.5, 0.5);
-  number("--centre-error", args->mistake.centre_px, "Error of its centre in u and v [px]", -1e3, 1e3);
-  number("--k1-error", args->mistake.k1, "What its k1 is too large by", -1.0, 1.0);
-  number("--drift-m", args->mistake.drift_m, "What the readings drift by from the first shot to the last [m]", -1.0,
-         1.0);
-  number("--bend-m", args->mistake.bend_m, "Curvature of the readings: too long by this 1 m from 2 m [m]", -1.0, 1.0);
-  number("--wander-px", args->mistake.wander_px, "What the spots move by from the first shot to the last", -1e3, 1e3);
-  command.add_flag("--exchange-uv", args->mistake.exchange_uv, "u and v of the spots are exchanged");
-  command.add_option("--unit", args->unit, "Of the readings in the table")
-      ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))
-      ->capture_default_str();
-  command.add_option("--shift-rows", args->mistake.shift_rows, "Ranges are this many rows late")
-      ->check(CLI::Range(-100, 100))
-      ->capture_default_str();
-  number("--speckle", args->speckle, "With --photos: contrast of the laser's speckle, 1 is full", 0.0, 1.0);
-  command.add_flag("--bayer", args->bayer, "With --photos: one colour a pixel, the others interpolated");
-  command.add_option("--jpeg", args->jpeg, "With --photos: compressed with this quality, 0: not")
-      ->check(CLI::Range(0, 100))
-      ->capture_default_str();
-  command.add_option("--stickers", args->stickers, "With --photos: red spots on the board that are not the laser's")
-      ->check(CLI::Range(0, 10))
-      ->capture_default_str();
-  command.add_flag("--photos", args->photos, "Render the photos instead of spots and corners");
-  command.add_flag("--photos-off", args->photos_off, "With --photos: each also with the laser off");
-  command.add_option("--laser", args->laser, "Colour of the laser in photos: red or green")
-      ->check(CLI::IsMember({"red", "green"}))
-      ->capture_default_str();
+  add_number(command, "--sigma-range-m", args->sigma_range_m, "Noise of a reading [m]", 0.0, 1.0);
+  add_number(command, "--sigma-px", args->noise.sigma_spot_px, "Noise of a spot's coordinate", 0.0, 100.0);
+  add_number(command, "--sigma-corner-px", args->noise.sigma_corner_px, "Noise of a corner's coordinate", 0.0, 100.0);
+  add_number(command, "--outliers", args->noise.outlier_share, "Share of shots whose beam passed the board", 0.0, 0.9);
+  add_number(command, "--scale", args->scale, "Metres for each metre read", 0.5, 2.0);
+  add_number(command, "--sigma-px-near", args->noise.sigma_spot_near_px,
+             "Noise of a spot at 1 m beyond that; falls with the range", 0.0, 100.0);
+  add_mistakes(command, *args);
+  add_photo_options(command, *args);
 }
 
 }  // namespace alidade::cli

@@ -135,19 +135,17 @@ void add_rig_scenario(App& app) {
   command.add_option("--views", args->views, "Views of each board by each head, at most")
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
-  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
-  };
-  number("--sigma-px", args->sigma_px, "Noise of a corner's coordinate", 0.0, 100.0);
-  number("--sigma-angle-deg", args->sigma_angle_deg, "Noise of a reading [deg]", 0.0, 10.0);
-  number("--wrong", args->wrong, "Share of the views with the angles of another", 0.0, 0.5);
-  number("--scale", args->scale, "Radians of each axis for each radian read", 0.5, 2.0);
-  number("--once-deg", args->once_deg, "Amplitude of an error of one period a turn of each axis [deg]", 0.0, 15.0);
-  number("--twice-deg", args->twice_deg, "The same of two periods a turn [deg]", 0.0, 15.0);
-  number("--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
-  number("--focal-error", args->mistake.focal, "Share by which the camera files' focal lengths are too long", -0.5,
-         0.5);
-  number("--centre-error", args->mistake.centre_px, "Error of their centres in u and v [px]", -1e3, 1e3);
+  add_number(command, "--sigma-px", args->sigma_px, "Noise of a corner's coordinate", 0.0, 100.0);
+  add_number(command, "--sigma-angle-deg", args->sigma_angle_deg, "Noise of a reading [deg]", 0.0, 10.0);
+  add_number(command, "--wrong", args->wrong, "Share of the views with the angles of another", 0.0, 0.5);
+  add_number(command, "--scale", args->scale, "Radians of each axis for each radian read", 0.5, 2.0);
+  add_number(command, "--once-deg", args->once_deg, "Amplitude of an error of one period a turn of each axis [deg]",
+             0.0, 15.0);
+  add_number(command, "--twice-deg", args->twice_deg, "The same of two periods a turn [deg]", 0.0, 15.0);
+  add_number(command, "--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
+  add_number(command, "--focal-error", args->mistake.focal,
+             "Share by which the camera files' focal lengths are too long", -0.5, 0.5);
+  add_number(command, "--centre-error", args->mistake.centre_px, "Error of their centres in u and v [px]", -1e3, 1e3);
   command.add_flag("--swap-angles", args->mistake.swap_angles, "Pan and tilt are exchanged");
   command.add_flag("--flip-pan", args->mistake.flip_pan, "Pan counts the other way");
   command.add_flag("--mirror", args->mistake.mirror, "Images are mirrored");

@@ -256,39 +256,35 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
 
 /// What a log may have that is not given.
 void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
-  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
-  };
   const auto numbers = [&](const char* name, std::vector<double>& values, int count, const char* help) {
     command.add_option(name, values, help)->delimiter(',')->expected(count)->check(finite_number());
   };
   RotationFaults& faults = args.faults;
-  number("--encoder-scale", faults.angle_scale, "Angles as measured over the true ones", 0.1, 10.0);
-  number("--backlash-deg", args.backlash_deg, "Play between the encoders and the camera [°]", 0.0, 10.0);
+  add_number(command, "--encoder-scale", faults.angle_scale, "Angles as measured over the true ones", 0.1, 10.0);
+  add_number(command, "--backlash-deg", args.backlash_deg, "Play between the encoders and the camera [°]", 0.0, 10.0);
   numbers("--curve-deg", args.curve_deg, 2, "Amplitudes of the encoders' error once and twice a turn [°]");
   numbers("--zero-drift", args.zero_drift, 2, "Of the zeros of pan, tilt [rad/s]");
   numbers("--signs", args.signs, 2, "1 or -1: how pan and tilt count");
   command.add_flag("--swap-axes", faults.swaps_axes, "Pan and tilt are exchanged");
   numbers("--bias", args.bias, 3, "Of the rates x,y,z [rad/s]");
   numbers("--mount-deg", args.mount_deg, 3, "The camera on its mount: rotation vector x,y,z [°]");
-  number("--line-time", args.shutter_s, "Rolling shutter: last row after the first [s]", -0.2, 0.2);
-  number("--clock-rate", args.clock_rate, "The images' clock over the rotation's, less one", -0.1, 0.1);
-  number("--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
-  number("--wrong", faults.wrong_share, "Share of pixels that are anywhere; of wrong matches in pairs.csv", 0.0, 0.95);
-  number("--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);
-  number("--moving", faults.moving_share, "Share of points that move, of those in pairs.csv, of a video's image", 0.0,
-         1.0);
-  number("--lasting-px", faults.noise_px, "Further noise of each track, which lasts [px]", 0.0, 100.0);
-  number("--lasting-s", faults.noise_lasts_s, "How long it lasts [s]", 0.0, 1000.0);
+  add_number(command, "--line-time", args.shutter_s, "Rolling shutter: last row after the first [s]", -0.2, 0.2);
+  add_number(command, "--clock-rate", args.clock_rate, "The images' clock over the rotation's, less one", -0.1, 0.1);
+  add_number(command, "--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
+  add_number(command, "--wrong", faults.wrong_share, "Share of pixels that are anywhere; of wrong matches in pairs.csv",
+             0.0, 0.95);
+  add_number(command, "--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);
+  add_number(command, "--moving", faults.moving_share,
+             "Share of points that move, of those in pairs.csv, of a video's image", 0.0, 1.0);
+  add_number(command, "--lasting-px", faults.noise_px, "Further noise of each track, which lasts [px]", 0.0, 100.0);
+  add_number(command, "--lasting-s", faults.noise_lasts_s, "How long it lasts [s]", 0.0, 1000.0);
   command.add_flag("!--no-range", args.with_range, "With --depth: without range_m");
 }
 
-void add_options(CLI::App& command, SimulateRotationArgs& args) {
+/// How it rotates and zooms, and what it sees.
+void add_world_options(CLI::App& command, SimulateRotationArgs& args) {
   const auto word = [&](const char* name, std::string& value, const char* help, std::vector<std::string> words) {
     command.add_option(name, value, help)->check(CLI::IsMember(std::move(words)))->capture_default_str();
-  };
-  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   word("--source", args.source, "How the rotation is measured: rate, head or attitude", {"rate", "head", "attitude"});
   word("--motion", args.motion, "sway (the paper's, eq. 27), pan, tilt, roll or still",
@@ -309,6 +305,10 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
       ->delimiter(',')
       ->expected(2)
       ->check(positive_number());
+}
+
+/// Frames and photos instead of points, and how they look.
+void add_image_options(CLI::App& command, SimulateRotationArgs& args) {
   command.add_flag("--video", args.video, "Render frames instead of points: frames/, angles.csv");
   command
       .add_option(
@@ -316,27 +316,36 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
           "Render so many photos of a camera that is rotated by hand instead, and matches between them: photos/, "
           "pairs.csv")
       ->check(CLI::Range(2, 200));
-  number("--zoomed", args.zoomed, "Focal length of the central photo over the others'", 0.2, 5.0);
+  add_number(command, "--zoomed", args.zoomed, "Focal length of the central photo over the others'", 0.2, 5.0);
   command.add_option("--photo", args.photo, "What the world of videos and photos looks like (default: noise)")
       ->type_name("FILE");
-  number("--photo-deg", args.photo_deg, "Angular width of that photo in the world", 1.0, 360.0);
-  number("--noise", args.panorama.noise, "Grey noise of the frames, of 255", 0.0, 100.0);
-  number("--blur", args.panorama.blur_px, "Optical blur of the frames [px]", 0.0, 20.0);
-  number("--k1", args.k1, "True radial distortion", -0.4, 0.4);
-  number("--k2", args.k2, "True lens: k2", -0.4, 0.4);
-  number("--k3", args.k3, "True lens: k3", -0.4, 0.4);
-  number("--p1", args.p1, "True lens: p1", -0.05, 0.05);
-  number("--p2", args.p2, "True lens: p2", -0.05, 0.05);
+  add_number(command, "--photo-deg", args.photo_deg, "Angular width of that photo in the world", 1.0, 360.0);
+  add_number(command, "--noise", args.panorama.noise, "Grey noise of the frames, of 255", 0.0, 100.0);
+  add_number(command, "--blur", args.panorama.blur_px, "Optical blur of the frames [px]", 0.0, 20.0);
+}
+
+void add_lens_options(CLI::App& command, SimulateRotationArgs& args) {
+  add_number(command, "--k1", args.k1, "True radial distortion", -0.4, 0.4);
+  add_number(command, "--k2", args.k2, "True lens: k2", -0.4, 0.4);
+  add_number(command, "--k3", args.k3, "True lens: k3", -0.4, 0.4);
+  add_number(command, "--p1", args.p1, "True lens: p1", -0.05, 0.05);
+  add_number(command, "--p2", args.p2, "True lens: p2", -0.05, 0.05);
+}
+
+void add_options(CLI::App& command, SimulateRotationArgs& args) {
+  add_world_options(command, args);
+  add_image_options(command, args);
+  add_lens_options(command, args);
   add_fault_options(command, args);
-  number("--tilt-deg", args.tilt_deg, "Mean tilt of a head", -80.0, 80.0);
-  number("--delay", args.delay_s, "Pixels are so much later than the rotation [s]", -0.5, 0.5);
-  number("--duration", args.config.duration_s, "Length of the log [s]", 0.1, 100000.0);
-  number("--rate", args.config.rate_hz, "Rows a second", 1.0, 10000.0);
-  number("--sigma-px", args.config.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0);
-  number("--sigma-rate", args.config.sigma_rate_rad_per_s, "Noise of a rate [rad/s]", 0.0, 1.0);
-  number("--sigma-angle", args.config.sigma_angle_rad, "Noise of an angle [rad]", 0.0, 1.0);
-  number("--sigma-range-m", args.config.sigma_range_m, "Noise of a range [m]", 0.0, 10.0);
-  number("--lost", args.config.lost_share, "Share of pixels not seen", 0.0, 0.95);
+  add_number(command, "--tilt-deg", args.tilt_deg, "Mean tilt of a head", -80.0, 80.0);
+  add_number(command, "--delay", args.delay_s, "Pixels are so much later than the rotation [s]", -0.5, 0.5);
+  add_number(command, "--duration", args.config.duration_s, "Length of the log [s]", 0.1, 100000.0);
+  add_number(command, "--rate", args.config.rate_hz, "Rows a second", 1.0, 10000.0);
+  add_number(command, "--sigma-px", args.config.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0);
+  add_number(command, "--sigma-rate", args.config.sigma_rate_rad_per_s, "Noise of a rate [rad/s]", 0.0, 1.0);
+  add_number(command, "--sigma-angle", args.config.sigma_angle_rad, "Noise of an angle [rad]", 0.0, 1.0);
+  add_number(command, "--sigma-range-m", args.config.sigma_range_m, "Noise of a range [m]", 0.0, 10.0);
+  add_number(command, "--lost", args.config.lost_share, "Share of pixels not seen", 0.0, 0.95);
 }
 
 }  // namespace

@@ -93,25 +93,22 @@ void add_servo_scenario(App& app) {
   command.add_option("--unit", args->unit, "Unit of the angle in the gain")
       ->check(CLI::IsMember({"deg", "rad"}))
       ->capture_default_str();
-  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
-  };
-  number("--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
-  number("--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);
-  number("--max-rate-deg-s", args->max_rate_deg_s, "Fastest turn [deg/s]", 1e-3, no_limit_deg_s);
-  number("--max-acceleration-deg-s2", args->max_acceleration_deg_s2, "With --kind rate: largest acceleration [deg/s2]",
-         1e-3, 1e9);
-  number("--dead-band", args->dead_band, "Commands no larger do nothing, larger ones count from it [units of command]",
-         0.0, 1e9);
-  number("--backlash-deg", args->backlash_deg, "Play between what drives the axis and the angle that is read", 0.0,
-         90.0);
-  number("--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);
-  number("--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
-  number("--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
-  number("--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);
-  number("--sigma-deg", args->sigma_deg, "Noise of the encoder", 0.0, 90.0);
-  number("--step-deg", args->step_deg, "One count of the encoder; 0: it does not round", 0.0, 90.0);
-  number("--zero-deg", args->zero_deg, "What the encoder reads at angle zero", -360.0, 360.0);
+  add_number(command, "--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
+  add_number(command, "--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);
+  add_number(command, "--max-rate-deg-s", args->max_rate_deg_s, "Fastest turn [deg/s]", 1e-3, no_limit_deg_s);
+  add_number(command, "--max-acceleration-deg-s2", args->max_acceleration_deg_s2,
+             "With --kind rate: largest acceleration [deg/s2]", 1e-3, 1e9);
+  add_number(command, "--dead-band", args->dead_band,
+             "Commands no larger do nothing, larger ones count from it [units of command]", 0.0, 1e9);
+  add_number(command, "--backlash-deg", args->backlash_deg,
+             "Play between what drives the axis and the angle that is read", 0.0, 90.0);
+  add_number(command, "--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);
+  add_number(command, "--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
+  add_number(command, "--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
+  add_number(command, "--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);
+  add_number(command, "--sigma-deg", args->sigma_deg, "Noise of the encoder", 0.0, 90.0);
+  add_number(command, "--step-deg", args->step_deg, "One count of the encoder; 0: it does not round", 0.0, 90.0);
+  add_number(command, "--zero-deg", args->zero_deg, "What the encoder reads at angle zero", -360.0, 360.0);
 }
 
 }  // namespace alidade::cli

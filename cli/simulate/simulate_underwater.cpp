@@ -139,6 +139,56 @@ ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   return run.finish(verdict);
 }
 
+/// What is not as given.
+void add_mistakes(CLI::App& command, SimulateUnderwaterArgs& args, CLI::Option* video) {
+  UnderwaterScene& scene = args.scene;
+  const char* const group = "What is not as given";
+  add_number(command, "--told-f", args.given_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)
+      ->group(group);
+  add_number(command, "--told-centre", args.given_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
+      ->group(group);
+  command.add_flag("!--no-k1", args.given_k1, "camera.yaml has no k1")->group(group);
+  add_number(command, "--readout", scene.readout_s, "Rolling shutter: time from the first row to the last [s]", 0.0,
+             1.0)
+      ->excludes(video)
+      ->group(group);
+  add_number(command, "--late", scene.late_s, "Images are taken so long before their times [s]", -10.0, 10.0)
+      ->excludes(video)
+      ->group(group);
+  add_number(command, "--target-speed", scene.target_speed_m_s,
+             "Of the board along its x, against the other points [m/s]", -1.0, 1.0)
+      ->excludes(video)
+      ->group(group);
+  add_number(command, "--target-stretch", scene.target_stretch,
+             "target.yaml's points are so much further apart along x", -0.5, 0.5)
+      ->excludes(video)
+      ->group(group);
+}
+
+/// What is seen, and how well.
+CLI::Option* add_scene(CLI::App& command, SimulateUnderwaterArgs& args) {
+  UnderwaterScene& scene = args.scene;
+  command.add_option("--camera", args.camera, "The camera (default: a strongly distorting one)")->type_name("FILE");
+  command.add_option("--frames", scene.num_frames, "How many frames")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  CLI::Option* points = command.add_option("--points", scene.num_points, "The board's 8, then others")
+                            ->check(CLI::Range(1, 1000))
+                            ->capture_default_str();
+  command.add_option("--rate", args.rate_hz, "Frames per second")->check(positive_number())->capture_default_str();
+  CLI::Option* video =
+      command.add_flag("--video", args.video,
+                       "Render images of the board instead of observations: frames/, as seen through turbid water");
+  add_number(command, "--blur-px", args.look.blur_px, "With --video: sigma of the blur [px]", 0.0, 10.0)->needs(video);
+  add_number(command, "--noise", args.look.noise, "With --video: sigma of a colour value's noise, of 255", 0.0, 100.0)
+      ->needs(video);
+  points->excludes(video);
+  add_number(command, "--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
+  add_number(command, "--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
+      ->excludes(video);
+  return video;
+}
+
 }  // namespace
 
 void add_underwater_scenario(App& app) {
@@ -153,52 +203,16 @@ void add_underwater_scenario(App& app) {
        true},
       [args](Run& run) { return simulate(*args, run); });
   UnderwaterScene& scene = args->scene;
-  command.add_option("--camera", args->camera, "The camera (default: a strongly distorting one)")->type_name("FILE");
-  command.add_option("--frames", scene.num_frames, "How many frames")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  CLI::Option* points = command.add_option("--points", scene.num_points, "The board's 8, then others")
-                            ->check(CLI::Range(1, 1000))
-                            ->capture_default_str();
-  command.add_option("--rate", args->rate_hz, "Frames per second")->check(positive_number())->capture_default_str();
-  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    return command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
-  };
-  CLI::Option* video =
-      command.add_flag("--video", args->video,
-                       "Render images of the board instead of observations: frames/, as seen through turbid water");
-  number("--blur-px", args->look.blur_px, "With --video: sigma of the blur [px]", 0.0, 10.0)->needs(video);
-  number("--noise", args->look.noise, "With --video: sigma of a colour value's noise, of 255", 0.0, 100.0)
-      ->needs(video);
-  points->excludes(video);
-  number("--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
-  number("--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
+  CLI::Option* video = add_scene(command, *args);
+  add_number(command, "--imu", args->imu_hz,
+             "An IMU beside the camera, so many readings a second: imu.csv, its mounting imu.yaml", 10.0, 10000.0);
+  add_number(command, "--imu-late", args->imu.late_s, "Its clock less the camera's [s]", -10.0, 10.0);
+  add_number(command, "--mismatches", scene.mismatches, "Share of the observations that show another point", 0.0, 1.0)
       ->excludes(video);
-  number("--imu", args->imu_hz, "An IMU beside the camera, so many readings a second: imu.csv, its mounting imu.yaml",
-         10.0, 10000.0);
-  number("--imu-late", args->imu.late_s, "Its clock less the camera's [s]", -10.0, 10.0);
-  number("--mismatches", scene.mismatches, "Share of the observations that show another point", 0.0, 1.0)
+  add_number(command, "--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)
       ->excludes(video);
-  number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
-  number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
-  const char* const group = "What is not as given";
-  number("--told-f", args->given_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)->group(group);
-  number("--told-centre", args->given_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
-      ->group(group);
-  command.add_flag("!--no-k1", args->given_k1, "camera.yaml has no k1")->group(group);
-  number("--readout", scene.readout_s, "Rolling shutter: time from the first row to the last [s]", 0.0, 1.0)
-      ->excludes(video)
-      ->group(group);
-  number("--late", scene.late_s, "Images are taken so long before their times [s]", -10.0, 10.0)
-      ->excludes(video)
-      ->group(group);
-  number("--target-speed", scene.target_speed_m_s, "Of the board along its x, against the other points [m/s]", -1.0,
-         1.0)
-      ->excludes(video)
-      ->group(group);
-  number("--target-stretch", scene.target_stretch, "target.yaml's points are so much further apart along x", -0.5, 0.5)
-      ->excludes(video)
-      ->group(group);
+  add_number(command, "--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
+  add_mistakes(command, *args, video);
 }
 
 }  // namespace alidade::cli

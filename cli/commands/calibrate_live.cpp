@@ -233,14 +233,19 @@ void require_no_capture(const CaptureArgs& args) {
                                {"--until", args.until_is_given}});
 }
 
+/// Faults of what was asked for, before any work; the photos' folder.
+void prepare(CaptureArgs& args, Run& run) {
+  if (args.no_page && args.from.empty())
+    throw UsageError("--no-page: only with --from, as there is no camera without a page");
+  (void)server_config(args.live);
+  if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
+  args.config.is_video = args.from.empty() || is_stream_address(args.from);
+}
+
 ExitCode calibrate_live(
     const Board& board, CaptureArgs args, Run& run,
     const std::function<ExitCode(const std::filesystem::path& photos, std::size_t num_inexact)>& finish) {
-  if (args.no_page && args.from.empty())
-    throw UsageError("--no-page: only with --from, as there is no camera without a page");
-  (void)server_config(args.live);  // its faults before any work
-  if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
-  args.config.is_video = args.from.empty() || is_stream_address(args.from);
+  prepare(args, run);
   const ImageSource source = opened_source(args.from);  // an address may be wrong: before anything is written
   std::optional<CaptureWork> work;
   std::optional<GuidePage> page;

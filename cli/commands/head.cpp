@@ -86,7 +86,8 @@ Field follow_field(NamedLook& look) {
   return field;
 }
 
-FieldList fields_of(HeadArgs& args) {
+/// What is done with the head, and from what.
+FieldList job_fields(HeadArgs& args) {
   return {
       {.name = "move", .value = &args.move, .help = "Allow the head to move; without it nothing moves"},
       {.name = "identify",
@@ -118,6 +119,11 @@ FieldList fields_of(HeadArgs& args) {
        .value = &args.password_file,
        .help = "Its first line is the password of the user in the addresses (default: ALIDADE_PASSWORD)",
        .form = "FILE"},
+  };
+}
+
+FieldList follow_fields(HeadArgs& args) {
+  return {
       follow_field(args.look),
       {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml of --calibrate", .form = "FILE"},
       {.name = "identified",
@@ -132,14 +138,25 @@ FieldList fields_of(HeadArgs& args) {
        .value = &args.follow.delay_s,
        .help = "For --follow: delay of the angles after a frame's time, as --calibrate estimates it [s]",
        .limits = {-2.0, 2.0}},
-      {.name = "pan_range",
-       .value = range_code(args.range, 0),
-       .help = "Allowed pan angles, in degrees, positive to the left (default: the head's own limits)",
-       .form = "LOW,HIGH"},
-      {.name = "tilt_range",
-       .value = range_code(args.range, 1),
-       .help = "Allowed tilt angles, in degrees, positive upwards (default: the head's own limits)",
-       .form = "LOW,HIGH"}};
+  };
+}
+
+FieldList range_fields(HeadArgs& args) {
+  return {{.name = "pan_range",
+           .value = range_code(args.range, 0),
+           .help = "Allowed pan angles, in degrees, positive to the left (default: the head's own limits)",
+           .form = "LOW,HIGH"},
+          {.name = "tilt_range",
+           .value = range_code(args.range, 1),
+           .help = "Allowed tilt angles, in degrees, positive upwards (default: the head's own limits)",
+           .form = "LOW,HIGH"}};
+}
+
+FieldList fields_of(HeadArgs& args) {
+  FieldList fields = job_fields(args);
+  for (const FieldList& more : {follow_fields(args), range_fields(args)})
+    fields.insert(fields.end(), more.begin(), more.end());
+  return fields;
 }
 
 void check_head(const HeadArgs& args) {

@@ -74,8 +74,9 @@ FieldList fields_of(Imu& imu) {
   };
 }
 
-FieldList fields_of(LocalizeArgs& args) {
-  FieldList fields = {
+/// What is localised in, and where it is shown.
+FieldList frame_fields(LocalizeArgs& args) {
+  return {
       {.name = "camera",
        .value = &args.camera,
        .help = "The camera, calibrated in the water it is used in",
@@ -103,6 +104,12 @@ FieldList fields_of(LocalizeArgs& args) {
            "endoscope's, found in the first image that shows one; or 'auto': without what never moves while the scene "
            "does, as a clock that is burnt in",
        .form = "FILE|circle|auto"},
+  };
+}
+
+/// Readings beside the images.
+FieldList sensor_fields(LocalizeArgs& args) {
+  return {
       {.name = "depth_sensor",
        .value = &args.depth_sensor,
        .help = "How deep the camera is, up to an offset, CSV: t_s,depth_m[,sigma_m]; metres without a target, else a "
@@ -136,6 +143,14 @@ FieldList fields_of(LocalizeArgs& args) {
        .help = "Its mounting, cam_from_imu: translation_m and quaternion_wxyz, or Kalibr's T_cam_imu "
                "(default: its rotation is found by the motion, its position within 0.1 m)",
        .form = "FILE"},
+  };
+}
+
+FieldList fields_of(LocalizeArgs& args) {
+  FieldList fields = frame_fields(args);
+  const auto append = [&](const FieldList& more) { fields.insert(fields.end(), more.begin(), more.end()); };
+  append(sensor_fields(args));
+  append({
       {.name = "truth",
        .value = &args.truth,
        .help = "True path as TUM (t x y z qx qy qz qw); adds ATE and RPE",
@@ -144,11 +159,9 @@ FieldList fields_of(LocalizeArgs& args) {
        .value = &args.rate_hz,
        .help = "Frames per second: times are frame numbers over this",
        .limits = {.min = 0.0, .is_above_min = true}},
-  };
-  const FieldList config = alidade::fields_of(args.config);
-  fields.insert(fields.end(), config.begin(), config.end());
-  const FieldList imu = fields_of(args.imu_values);
-  fields.insert(fields.end(), imu.begin(), imu.end());
+  });
+  append(alidade::fields_of(args.config));
+  append(fields_of(args.imu_values));
   fields.push_back(
       {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip rows that are wrong, by name, instead of stopping"});
   return fields;

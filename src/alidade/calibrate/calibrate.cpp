@@ -204,6 +204,39 @@ void judge(const CalibrationWork& work, const BundleResult& result, bool settled
   }
 }
 
+void refuse_few(const CalibrationWork& work, std::size_t least, CalibrateReport& report) {
+  const bool repeated = std::any_of(report.views.begin(), report.views.end(),
+                                    [](const ViewFit& view) { return view.reason.starts_with("is the same image"); });
+  refuse(report,
+         "only " + std::to_string(work.views.size()) + " usable photo" + (work.views.size() == 1 ? "" : "s") +
+             " of the board" + (repeated ? " (others are the same image)" : "") + "; it takes " + std::to_string(least),
+         "add photos of the board, tilted 20–45° in several directions");
+}
+
+/// Whether no tilt tells the focal length from the distance. A port behind a known lens may be determined from parallel
+/// boards: its σ will say.
+bool boards_are_parallel(const CalibrationWork& work, const Lens& held, std::span<const Rigid3> cam_from_board) {
+  constexpr double parallel_rad = 0.05;  // 3°: below it, tilt is what noise makes of it
+  const bool lens_is_known = !is_central(held) && work.problem.free_lens.front() >= 4;
+  return !lens_is_known && spread_of_normals_rad(cam_from_board) < parallel_rad;
+}
+
+/// From an initial guess on.
+void solve_all(const CalibrateConfig& config, ImageSize size, BundleState state, CalibrationWork& work,
+               CalibrateReport& report) {
+  make_all_arrays(config, work);
+  NoiseEstimate noise;
+  Minima minima = solve_robustly(config, size, std::move(state), report, work, noise);
+  fill_estimate(work, minima, noise, size, report);
+  fill_views(work, minima.least, noise, report);
+  report.camera.rms_px = report.rms_px;
+  const std::size_t least = min_views(config);
+  if (work.views.size() < least)
+    refuse_few(work, least, report);
+  else
+    judge(work, minima.least, minima.settled, report);
+}
+
 }  // namespace
 
 bool rejects_outliers(const CalibrateConfig& config, bool have_covariances) {
@@ -226,17 +259,8 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   CalibrationWork work;
   take_usable_views(views, report, work);
   const std::size_t least = min_views(config);
-  const bool repeated = std::any_of(report.views.begin(), report.views.end(),
-                                    [](const ViewFit& view) { return view.reason.starts_with("is the same image"); });
-  const auto too_few = [&] {
-    refuse(report,
-           "only " + std::to_string(work.views.size()) + " usable photo" + (work.views.size() == 1 ? "" : "s") +
-               " of the board" + (repeated ? " (others are the same image)" : "") + "; it takes " +
-               std::to_string(least),
-           "add photos of the board, tilted 20–45° in several directions");
-  };
   if (work.views.size() < least) {
-    too_few();
+    refuse_few(work, least, report);
     return report;
   }
   const Lens held = set_up_problem(board, config, size, work.problem);
@@ -248,29 +272,15 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   report.camera.lens = state.lens;
   if (start) find_poses(start->cam_from_board, report, work, state);
   if (!start || work.views.size() < least) {
-    too_few();
+    refuse_few(work, least, report);
     return report;
   }
-  constexpr double parallel_rad = 0.05;  // 3°: below it, tilt is what noise makes of it
-  // A port behind a known lens may be determined from parallel boards: its σ will say.
-  const bool lens_is_known = !is_central(held) && work.problem.free_lens.front() >= 4;
-  if (!lens_is_known && spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
+  if (boards_are_parallel(work, held, state.cam_from_board)) {
     refuse(report, "all boards are parallel: the focal length cannot be determined from the distance",
            "tilt the board 20–45° in several directions");
     return report;
   }
-  make_all_arrays(config, work);
-  NoiseEstimate noise;
-  Minima minima = solve_robustly(config, size, std::move(state), report, work, noise);
-  const BundleResult& result = minima.least;
-  fill_estimate(work, minima, noise, size, report);
-  fill_views(work, result, noise, report);
-  report.camera.rms_px = report.rms_px;
-  if (work.views.size() < least) {
-    too_few();
-    return report;
-  }
-  judge(work, result, minima.settled, report);
+  solve_all(config, size, std::move(state), work, report);
   return report;
 }
 

@@ -59,6 +59,19 @@ ALIDADE_VECTOR_CLONES void row_distances(StartEdge one, StartEdge two, int from,
   }
 }
 
+/// A row's distances to the edges.
+struct RowDistances {
+  std::vector<float> to_one, to_two;
+
+  void take(const StartEdge& one, const StartEdge& two, int from, int y, std::size_t count) {
+    if (to_one.size() < count) {
+      to_one.resize(count);
+      to_two.resize(count);
+    }
+    row_distances(one, two, from, y, count, to_one.data(), to_two.data());
+  }
+};
+
 void add_far(FarPixels& far, double grey) {
   far.count += 1.0;
   far.sum += grey;
@@ -82,6 +95,11 @@ Parallelogram parallelogram_of(const CornerStart& start, const CornerFitConfig& 
           std::abs(square(1, 0)) * half[0] + std::abs(square(1, 1)) * half[1]};
 }
 
+void make_room(std::size_t most, CornerWindow& window) {
+  for (std::vector<float>* values : {&window.x, &window.y, &window.grey})
+    if (values->size() < most) values->resize(2 * most);
+}
+
 }  // namespace
 
 CornerWindow gather_window(const cv::Mat& photo, const CornerStart& start, const CornerFitConfig& config,
@@ -98,21 +116,16 @@ CornerWindow gather_window(const cv::Mat& photo, const CornerStart& start, const
   const int y_min = std::max(-origin_y, static_cast<int>(std::ceil(area.center.y() - area.reach_y)));
   const int y_max = std::min(photo.rows - 1 - origin_y, static_cast<int>(std::floor(area.center.y() + area.reach_y)));
   std::size_t count = 0;
-  std::vector<float> to_one, to_two;  // a row's distances to the edges
+  RowDistances distances;
   for (int y = y_min; y <= y_max; ++y) {
     const auto [first, last] = span_of_row(area.inverse, area.half, area.center, y);
     const float* row = photo.ptr<float>(origin_y + y) + origin_x;
     const int from = std::max(first, -origin_x), to = std::min(last, photo.cols - 1 - origin_x);
     if (to < from) continue;
     const auto num_in_row = static_cast<std::size_t>(to - from + 1), most = count + num_in_row;
-    for (std::vector<float>* values : {&window.x, &window.y, &window.grey}) {
-      if (values->size() < most) values->resize(2 * most);
-    }
-    if (to_one.size() < num_in_row) {
-      to_one.resize(num_in_row);
-      to_two.resize(num_in_row);
-    }
-    row_distances(one, two, from, y, num_in_row, to_one.data(), to_two.data());
+    make_room(most, window);
+    distances.take(one, two, from, y, num_in_row);
+    const std::vector<float>&to_one = distances.to_one, &to_two = distances.to_two;
     for (std::size_t i = 0; i < num_in_row; ++i) {
       const int x = from + static_cast<int>(i);
       if (std::abs(to_one[i]) > near && std::abs(to_two[i]) > near) {

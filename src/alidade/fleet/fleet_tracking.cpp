@@ -75,15 +75,10 @@ void leave_out_strays(const FleetCommonMatrix& P, Innovations& all) {
   all.num = kept;
 }
 
-Innovations innovations_of(FleetCamera& camera, const FleetRow& row, const FleetView& view, const FleetCommon& x,
-                           const FleetCommonMatrix& P) {
-  Innovations all;
+/// Each point that is seen, against where it is expected.
+void see_points(FleetCamera& camera, const FleetRow& row, const FleetView& view, const FleetCommon& x,
+                Innovations& all) {
   const double variance = camera.sigma_px * camera.sigma_px;
-  FleetCommonMatrix information = FleetCommonMatrix::Zero();
-  FleetCommon gradient = FleetCommon::Zero();
-  Eigen::Matrix<double, num_fleet_channels, num_fleet_common> W;
-  W.setZero();
-  double squares = 0.0;
   for (std::size_t k = 0; k < camera.num_points; ++k) {
     const Eigen::Vector2d px(row.px[2 * k], row.px[2 * k + 1]);
     if ((camera.known_points >> k & 1U) == 0 || !std::isfinite(px.x()) || !std::isfinite(px.y())) continue;
@@ -103,7 +98,18 @@ Innovations innovations_of(FleetCamera& camera, const FleetRow& row, const Fleet
     seen.C << point.cov[0], point.cov[1], point.cov[1], point.cov[2];
     seen.R_inverse = (variance * Eigen::Matrix2d::Identity() + seen.J * seen.C * seen.J.transpose()).inverse();
   }
+}
+
+Innovations innovations_of(FleetCamera& camera, const FleetRow& row, const FleetView& view, const FleetCommon& x,
+                           const FleetCommonMatrix& P) {
+  Innovations all;
+  see_points(camera, row, view, x, all);
   leave_out_strays(P, all);
+  FleetCommonMatrix information = FleetCommonMatrix::Zero();
+  FleetCommon gradient = FleetCommon::Zero();
+  Eigen::Matrix<double, num_fleet_channels, num_fleet_common> W;
+  W.setZero();
+  double squares = 0.0;
   for (std::size_t i = 0; i < all.num; ++i) {
     const Seen& seen = all.seen[i];
     const FleetPixelByCommon weighted = seen.R_inverse * seen.G;
@@ -300,11 +306,35 @@ int add_scores(FleetSums& sums, const FleetScores& row, double noise_factor, dou
   return found;
 }
 
+namespace {
+
+/// Whether the sums of a row's scores have found a change, which is learned from the next row on. One that is too large
+/// to be one loses the camera.
+bool finds_change(const Innovations& all, const FleetConfig& config, double factor, double t_s, FleetCamera& camera) {
+  FleetTracking& tracking = camera.body.tracking;
+  const bool has_angles = camera.source != FleetSource::rate;
+  FleetScores scores;
+  for (std::size_t i = has_angles ? 0 : 2; i < num_fleet_channels; ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    scores.score[i] = all.score[at];
+    scores.information[i] = all.information(at, at);
+  }
+  const int found = add_scores(tracking.sums, scores, factor, t_s, config.threshold);
+  if (found < 0) return false;
+  const int clearest = clearest_of(all, tracking.sums, config.threshold, found);
+  const FleetSum& sum = tracking.sums[static_cast<std::size_t>(clearest)];
+  const bool is_possible = std::abs(sum.score / sum.information) < largest_change;
+  camera.num_gated = is_possible ? 0 : lost_rows;
+  if (is_possible) begin_change(clearest, tracking);
+  return true;
+}
+
+}  // namespace
+
 std::optional<FleetAlarm> track_row(FleetCamera& camera, const FleetRow& row, const FleetRotation& rotation,
                                     const FleetConfig& config) {
   FleetTracking& tracking = camera.body.tracking;
-  const bool has_angles = camera.source != FleetSource::rate;
-  if (!has_angles) {
+  if (camera.source == FleetSource::rate) {
     FleetCommon variance = FleetCommon::Zero();
     variance.segment<2>(4).setConstant(rate_walk * rate_walk * std::max(0.0, row.t_s - camera.t_s));
     walk(variance, tracking);
@@ -315,23 +345,8 @@ std::optional<FleetAlarm> track_row(FleetCamera& camera, const FleetRow& row, co
   if (all.num == 0) return std::nullopt;
   const double factor = noise_factor(camera), dof = 2.0 * static_cast<double>(all.num);
   const bool is_learning = tracking.change.rows_left > 0;
-  if (!is_learning) {
-    FleetScores scores;
-    for (std::size_t i = has_angles ? 0 : 2; i < num_fleet_channels; ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      scores.score[i] = all.score[at];
-      scores.information[i] = all.information(at, at);
-    }
-    const int found = add_scores(tracking.sums, scores, factor, row.t_s, config.threshold);
-    if (found >= 0) {
-      const int clearest = clearest_of(all, tracking.sums, config.threshold, found);
-      const FleetSum& sum = tracking.sums[static_cast<std::size_t>(clearest)];
-      const bool is_possible = std::abs(sum.score / sum.information) < largest_change;
-      camera.num_gated = is_possible ? 0 : lost_rows;
-      if (is_possible) begin_change(clearest, tracking);
-      return std::nullopt;  // this row has been used already
-    }
-  }
+  if (!is_learning && finds_change(all, config, factor, row.t_s, camera))
+    return std::nullopt;  // this row has been used already
   const bool fits = all.nis <= factor * gate_of(dof);
   if (fits) {
     camera.num_gated = 0;

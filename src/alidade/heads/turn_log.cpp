@@ -107,16 +107,22 @@ std::optional<HeadLine> even_motion(std::span<const HeadPosition> readings, cons
   return result;
 }
 
-RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const SeenFrame> frames, double late_s,
-                     double origin_s) {
-  constexpr double before_s = 0.01, same_place_rad = 1e-4;
-  constexpr int max_at_rest = 6;
-  RotationLog log;
-  log.source = RotationSource::head;
-  if (readings.size() < 2) return log;
-  const HeadManner manner = manner_of(readings);
-  std::vector<SeenFrame> kept;
+namespace {
+
+constexpr double before_s = 0.01;  ///< Between the rows of a frame.
+
+/// Frames whose angles are known, with the motion there.
+struct MovingFrames {
+  std::vector<SeenFrame> frames;
   std::vector<HeadLine> lines;
+};
+
+/// Of each rest some: what lies between two may all be of uneven motion.
+MovingFrames known_frames(std::span<const HeadPosition> readings, std::span<const SeenFrame> frames, double late_s) {
+  constexpr double same_place_rad = 1e-4;
+  constexpr int max_at_rest = 6;
+  const HeadManner manner = manner_of(readings);
+  MovingFrames kept;
   int at_rest = 0;
   Eigen::Vector2d rested_rad = Eigen::Vector2d::Constant(not_seen);
   for (const SeenFrame& frame : frames) {
@@ -124,25 +130,35 @@ RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const See
     const auto line =
         even_motion(readings, manner, frame.t_s, std::min(frame.t_s, shown_s), std::max(frame.t_s, shown_s));
     if (!line || frame.points.empty()) continue;
-    if (!kept.empty() && frame.t_s - kept.back().t_s < 3.0 * before_s) continue;
-    // Of each rest: what lies between two may all be of uneven motion.
+    if (!kept.frames.empty() && frame.t_s - kept.frames.back().t_s < 3.0 * before_s) continue;
     const bool rests_on = line->rate_rad_s.isZero() && (line->pan_tilt_rad - rested_rad).norm() < same_place_rad;
     at_rest = rests_on ? at_rest + 1 : line->rate_rad_s.isZero() ? 1 : 0;
     rested_rad = line->rate_rad_s.isZero() ? line->pan_tilt_rad : Eigen::Vector2d::Constant(not_seen);
     if (at_rest > max_at_rest) continue;
-    kept.push_back(frame);
-    lines.push_back(*line);
+    kept.frames.push_back(frame);
+    kept.lines.push_back(*line);
   }
-  const std::map<int, std::size_t> columns = columns_of(kept);
+  return kept;
+}
+
+}  // namespace
+
+RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const SeenFrame> frames, double late_s,
+                     double origin_s) {
+  RotationLog log;
+  log.source = RotationSource::head;
+  if (readings.size() < 2) return log;
+  const MovingFrames kept = known_frames(readings, frames, late_s);
+  const std::map<int, std::size_t> columns = columns_of(kept.frames);
   log.num_points = columns.size();
-  for (std::size_t i = 0; i < kept.size(); ++i) {
+  for (std::size_t i = 0; i < kept.frames.size(); ++i) {
     for (int k = 2; k >= 0; --k) {
       RotationRow row;
-      row.t_s = kept[i].t_s - before_s * k - origin_s;
-      const Eigen::Vector2d angles = lines[i].pan_tilt_rad - before_s * k * lines[i].rate_rad_s;
+      row.t_s = kept.frames[i].t_s - before_s * k - origin_s;
+      const Eigen::Vector2d angles = kept.lines[i].pan_tilt_rad - before_s * k * kept.lines[i].rate_rad_s;
       row.pan_tilt_roll_rad = Eigen::Vector3d(angles[0], angles[1], 0.0);
       row.px.assign(columns.size(), Eigen::Vector2d::Constant(not_seen));
-      for (const TrackedPoint& point : kept[i].points)
+      for (const TrackedPoint& point : kept.frames[i].points)
         if (const auto column = columns.find(point.id); k == 0 && column != columns.end())
           row.px[column->second] = point.px;
       log.rows.push_back(std::move(row));

@@ -1,11 +1,13 @@
 #include "alidade/localize/config.h"
 
 namespace alidade {
+namespace {
 
-FieldList fields_of(LocalizeConfig& config) {
+constexpr Limits positive{.min = 0.0, .is_above_min = true};
+
+FieldList model_fields(LocalizeConfig& config) {
   static const WordList<NewPoints> new_points = {
       {NewPoints::inverse_depth, "inverse-depth"}, {NewPoints::xyz, "xyz"}, {NewPoints::delayed, "delayed"}};
-  constexpr Limits positive{.min = 0.0, .is_above_min = true};
   return {
       {.name = "distortion",
        .value = words_code(config.distortion, distortion_words()),
@@ -20,6 +22,11 @@ FieldList fields_of(LocalizeConfig& config) {
        .value = &config.depth_m,
        .help = "Depth first assumed for a new point [m] (default: the target's)",
        .limits = positive},
+  };
+}
+
+FieldList sigma_fields(LocalizeConfig& config) {
+  return {
       {.name = "sigma_depth", .value = &config.sigma_depth, .help = "σ of that depth, relative", .limits = positive},
       {.name = "sigma_px",
        .value = &config.sigma_px,
@@ -50,12 +57,21 @@ FieldList fields_of(LocalizeConfig& config) {
        .value = &config.sigma_odometry,
        .help = "σ of the scale of --odometry, relative, as of a wheel's radius (0.01: 1 %)",
        .limits = positive},
-      {.name = "max_points",
-       .value = &config.max_points,
-       .help = "Points in the filter at once, beside the target's: when full, the least informative is removed, and "
-               "added again when it is seen again (0: as many as its state of 800 holds; in images 120)",
-       .limits = {0.0, 3000.0}},
   };
+}
+
+}  // namespace
+
+FieldList fields_of(LocalizeConfig& config) {
+  FieldList fields = model_fields(config);
+  for (Field& field : sigma_fields(config)) fields.push_back(std::move(field));
+  fields.push_back({.name = "max_points",
+                    .value = &config.max_points,
+                    .help = "Points in the filter at once, beside the target's: when full, the least informative is "
+                            "removed, and added again when it is seen again (0: as many as its state of 800 holds; in "
+                            "images 120)",
+                    .limits = {0.0, 3000.0}});
+  return fields;
 }
 
 }  // namespace alidade

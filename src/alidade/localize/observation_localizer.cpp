@@ -331,42 +331,48 @@ PathStep ObservationLocalizer::take(const ObservationFrame& given) {
   return step;
 }
 
+/// Where the camera is at a frame before its observations are looked at; the first of them begin.
+FrameEvent ObservationLocalizer::come_to(const ObservationFrame& frame) {
+  if (!engine_.has_begun()) return start(frame) ? FrameEvent::started : FrameEvent::waiting;
+  engine_.predict_to(frame.t_s, period_s());
+  enter_known(frame);
+  if (config_.restarts && is_vague(frame)) place_by_target(frame);
+  return FrameEvent::tracked;
+}
+
+/// Where the path is doubted, another begins: from the target, or from where it is.
+void ObservationLocalizer::heed_doubt(const ObservationFrame& frame, std::optional<OtherPlace> other, Doubt doubt,
+                                      const ObservationsReport& report, PathStep& step) {
+  if ((other && find_again(std::move(*other), frame, report)) || restart(frame, doubt)) {
+    const ObservationsReport again = engine_.update(frame.observations);
+    engine_.fill(frame.observations, again, step);
+    step.event = FrameEvent::restarted;
+  }
+  if (begin_again(doubt)) {
+    step.event = FrameEvent::restarted;
+    engine_.fill_pose(step);
+    add_new(frame);
+  }
+}
+
 PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
   PathStep step;
   step.frame = frame.frame;
   step.t_s = frame.t_s;
   step.num_seen = frame.observations.size();
-  step.event = FrameEvent::tracked;
-  if (!engine_.has_begun()) {
-    if (!start(frame)) {
-      step.event = FrameEvent::waiting;
-      return step;
-    }
-    step.event = FrameEvent::started;
-  } else {
-    engine_.predict_to(frame.t_s, period_s());
-    enter_known(frame);
-    if (config_.restarts && is_vague(frame)) place_by_target(frame);
-  }
+  step.event = come_to(frame);
+  if (step.event == FrameEvent::waiting) return step;
+  const bool may_be_elsewhere = config_.restarts && step.event == FrameEvent::tracked;
   std::optional<OtherPlace> other;
-  if (config_.restarts && step.event == FrameEvent::tracked) other = other_place(frame);
+  if (may_be_elsewhere) other = other_place(frame);
   const ObservationsReport report = engine_.update(frame.observations);
   engine_.fill(frame.observations, report, step);
   engine_.keep_residuals(frame.observations, report);
-  if (config_.restarts && step.event == FrameEvent::tracked && !other) other = other_place(frame);
+  if (may_be_elsewhere && !other) other = other_place(frame);
   if (step.event == FrameEvent::tracked && step.num_tracked < min_observations) step.event = FrameEvent::predicted;
   const Doubt doubt = engine_.doubt_after(step);
   drop_strangers(frame, report);
-  if (config_.restarts && ((other && find_again(std::move(*other), frame, report)) || restart(frame, doubt))) {
-    const ObservationsReport again = engine_.update(frame.observations);
-    engine_.fill(frame.observations, again, step);
-    step.event = FrameEvent::restarted;
-  }
-  if (config_.restarts && begin_again(doubt)) {
-    step.event = FrameEvent::restarted;
-    engine_.fill_pose(step);
-    add_new(frame);
-  }
+  if (config_.restarts) heed_doubt(frame, std::move(other), doubt, report, step);
   if (step.num_tracked >= min_observations || step.event == FrameEvent::started) add_new(frame);
   engine_.filters().convert_linear();
   engine_.keep_given();

@@ -32,6 +32,7 @@ class ObservationLocalizer {
   [[nodiscard]] ObservationFrame numbered(ObservationFrame frame);
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
   [[nodiscard]] bool start(const ObservationFrame& frame);
+  [[nodiscard]] FrameEvent come_to(const ObservationFrame& frame);
   void add_new(const ObservationFrame& frame);
   void enter_known(const ObservationFrame& frame);
   [[nodiscard]] bool has_room() const;
@@ -58,6 +59,8 @@ class ObservationLocalizer {
   [[nodiscard]] std::optional<OtherPlace> other_place(const ObservationFrame& frame) const;
   [[nodiscard]] bool is_firm(long id) const;
   [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
+  void heed_doubt(const ObservationFrame& frame, std::optional<OtherPlace> other, Doubt doubt,
+                  const ObservationsReport& report, PathStep& step);
 
   [[nodiscard]] Recording recording() const;
 

@@ -212,45 +212,54 @@ LocalizationFilterConfig image_filter(const LocalizeConfig& config) {
   return filter;
 }
 
-}  // namespace
-
-void require_sense(const LocalizeConfig& config, const Camera& camera) {
+void add_field_faults(const LocalizeConfig& config, Sentences& found) {
   LocalizeConfig copy = config;
-  Sentences found = faults_of(fields_of(copy));
+  found = faults_of(fields_of(copy));
   for (const Field& field : fields_of(copy))
     if (const auto* code = std::get_if<TextCode>(&field.value); code != nullptr && code->write().empty())
       found.push_back(fmt::format("{} is none of {}", field.name, form_text(field)));
   for (std::string& fault : faults_of(inner_fields(copy))) found.push_back(std::move(fault));
+}
+
+/// Of the sensors beside the camera.
+void add_reading_faults(const LocalizeConfig& config, Sentences& found) {
+  if (!std::ranges::all_of(config.depth_readings, [](const DepthReading& reading) {
+        return std::isfinite(reading.t_s + reading.depth_m) && reading.sigma_m > 0.0 && std::isfinite(reading.sigma_m);
+      }))
+    found.emplace_back("a depth reading is not finite, or its sigma_m is not above 0");
+  if (!std::ranges::all_of(config.odometry_readings, [](const OdometryReading& reading) {
+        return std::isfinite(reading.t_s) && reading.position_m.allFinite();
+      }))
+    found.emplace_back("an odometry reading is not finite");
+  if (config.imu) add_faults(*config.imu, found);
+  if (!std::ranges::all_of(config.range_readings, [](const RangeReading& reading) {
+        return std::isfinite(reading.t_s) && reading.range_m > 0.0 && std::isfinite(reading.range_m);
+      }))
+    found.emplace_back("a range reading is not finite and above 0");
+}
+
+void add_faults(const ImageMask& mask, const Camera& camera, Sentences& found) {
+  if (mask.width_px != camera.width_px || mask.height_px != camera.height_px ||
+      mask.shows.size() != static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px))
+    found.push_back(
+        fmt::format("the mask is {} × {} px and the camera's images are {} × {} px: give a mask of their size",
+                    mask.width_px, mask.height_px, camera.width_px, camera.height_px));
+  else if (std::none_of(mask.shows.begin(), mask.shows.end(), [](auto shown) { return shown != 0; }))
+    found.emplace_back("the mask is black everywhere: it is white where the scene is shown");
+}
+
+}  // namespace
+
+void require_sense(const LocalizeConfig& config, const Camera& camera) {
+  Sentences found;
+  add_field_faults(config, found);
   add_faults(camera, found);
   throw_if_any(found);
   add_faults(config.target, found);
   if (config.map) add_faults(*config.map, config, found);
   if (config.start) add_faults(*config.start, found);
-  for (const DepthReading& reading : config.depth_readings)
-    if (!std::isfinite(reading.t_s + reading.depth_m) || !(reading.sigma_m > 0.0) || !std::isfinite(reading.sigma_m)) {
-      found.emplace_back("a depth reading is not finite, or its sigma_m is not above 0");
-      break;
-    }
-  for (const OdometryReading& reading : config.odometry_readings)
-    if (!std::isfinite(reading.t_s) || !reading.position_m.allFinite()) {
-      found.emplace_back("an odometry reading is not finite");
-      break;
-    }
-  if (config.imu) add_faults(*config.imu, found);
-  for (const RangeReading& reading : config.range_readings)
-    if (!std::isfinite(reading.t_s) || !(reading.range_m > 0.0) || !std::isfinite(reading.range_m)) {
-      found.emplace_back("a range reading is not finite and above 0");
-      break;
-    }
-  if (config.mask && (config.mask->width_px != camera.width_px || config.mask->height_px != camera.height_px ||
-                      config.mask->shows.size() !=
-                          static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px)))
-    found.push_back(
-        fmt::format("the mask is {} × {} px and the camera's images are {} × {} px: give a mask of their size",
-                    config.mask->width_px, config.mask->height_px, camera.width_px, camera.height_px));
-  else if (config.mask &&
-           std::none_of(config.mask->shows.begin(), config.mask->shows.end(), [](auto shown) { return shown != 0; }))
-    found.emplace_back("the mask is black everywhere: it is white where the scene is shown");
+  add_reading_faults(config, found);
+  if (config.mask) add_faults(*config.mask, camera, found);
   if (!config.range_readings.empty() && !config.beam) found.emplace_back("range readings need a beam");
   add_lens_faults(config.filter, camera, found);
   throw_if_any(found);

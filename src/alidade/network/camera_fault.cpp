@@ -98,6 +98,27 @@ std::vector<std::pair<std::size_t, std::size_t>> exchanges_of(std::span<const Ri
 
 std::string name_of(const RigHead& head) { return std::to_string(head.head.id); }
 
+/// What may be wrong, each thing undone: mirrored images, where the cameras do not agree at all, and exchanged lenses.
+Best best_undone(const std::vector<TargetObservation>& observations, const std::vector<RigHead>& given,
+                 std::span<const std::pair<std::size_t, std::size_t>> exchanges, bool doubtful,
+                 const PlaceCameras& place) {
+  Best best;
+  for (std::size_t h = 0; doubtful && h < given.size() && (given.size() > 2 || h == 0); ++h) {
+    const std::string words = given.size() == 2 ? "one of the two cameras gives mirrored images"
+                                                : "the images of head " + name_of(given[h]) + " are mirrored";
+    best.consider(agreement_of(place(mirrored(observations, h, given[h].camera.width_px), given, doubtful)), words);
+  }
+  for (const auto& [a, b] : exchanges) {
+    std::vector<RigHead> exchanged = given;
+    std::swap(exchanged[a].camera, exchanged[b].camera);
+    const Agreement agreement = agreement_of(place(observations, exchanged, doubtful));
+    // One wrong file may fit another head better, and is as wrong there.
+    if (agreement.focal_sigmas > focal_limit) continue;
+    best.consider(agreement, "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
+  }
+  return best;
+}
+
 }  // namespace
 
 std::string camera_fault_of(const MovingTargetReport& report, std::span<const TargetObservation> observations,
@@ -122,20 +143,7 @@ std::string camera_fault_of(const MovingTargetReport& report, std::span<const Ta
     some = all;
     as_given = in_all;
   }
-  Best best;
-  for (std::size_t h = 0; doubtful && h < given.size() && (given.size() > 2 || h == 0); ++h) {
-    const std::string words = given.size() == 2 ? "one of the two cameras gives mirrored images"
-                                                : "the images of head " + name_of(given[h]) + " are mirrored";
-    best.consider(agreement_of(place(mirrored(some, h, given[h].camera.width_px), given, doubtful)), words);
-  }
-  for (const auto& [a, b] : exchanges) {
-    std::vector<RigHead> exchanged = given;
-    std::swap(exchanged[a].camera, exchanged[b].camera);
-    const Agreement agreement = agreement_of(place(some, exchanged, doubtful));
-    // One wrong file may fit another head better, and is as wrong there.
-    if (agreement.focal_sigmas > focal_limit) continue;
-    best.consider(agreement, "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
-  }
+  const Best best = best_undone(some, given, exchanges, doubtful, place);
   // By as much less is left as no chance would have it: of thousands of observations a hundredth would be.
   // Where one was not located at all, the others may have agreed well: so must all now.
   constexpr double much_less = 0.93, about_as_little = 1.3;

@@ -15,20 +15,35 @@ Verdict moving_refusal(std::string sentence, std::string add) {
   return {State::refused, ExitCode::undetermined, std::move(sentence), std::move(add), {}};
 }
 
-Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetConfig& config) {
-  switch (report.status) {
+/// What to try differs where each camera may have a clock of its own.
+Verdict refusal_of_clocks(PlacedStatus status, bool searches_clocks) {
+  switch (status) {
     case PlacedStatus::too_few:
       return moving_refusal("no two cameras saw the target together in 30 moments or more",
-                            config.clock_search_s > 0.0
+                            searches_clocks
                                 ? "let the target move where the cameras' views overlap, or raise --clocks"
                                 : "let the target move where the views overlap; where each camera has its own clock, "
                                   "give --clocks SECONDS");
     case PlacedStatus::no_pair:
-      return moving_refusal(config.clock_search_s > 0.0
-                                ? "no two cameras' observations agree at any difference of their clocks"
-                                : "no two cameras' observations agree: their clocks differ, or a lens is wrong",
-                            config.clock_search_s > 0.0 ? "raise --clocks; check the lenses and their order"
-                                                        : "give --clocks SECONDS; check the lenses and their order");
+      return moving_refusal(searches_clocks ? "no two cameras' observations agree at any difference of their clocks"
+                                            : "no two cameras' observations agree: their clocks differ, or a lens is "
+                                              "wrong",
+                            searches_clocks ? "raise --clocks; check the lenses and their order"
+                                            : "give --clocks SECONDS; check the lenses and their order");
+    case PlacedStatus::truth_misfits:
+      return moving_refusal("the path that was seen is not the true path given, whatever its scale",
+                            searches_clocks ? "check that --truth is of the same flight and metres"
+                                            : "give --clocks SECONDS where the true path has a clock of its own");
+    default:
+      return moving_refusal("no path fits what the cameras saw by one clock",
+                            "give --clocks SECONDS where each camera has its own clock; check the lenses, and that one "
+                            "target only is in the table");
+  }
+}
+
+Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetConfig& config) {
+  const bool searches_clocks = config.clock_search_s > 0.0;
+  switch (report.status) {
     case PlacedStatus::degenerate:
       return moving_refusal("the cameras' positions cannot be determined from this path",
                             "let the target move in all three directions and near the cameras, not along a line");
@@ -36,26 +51,18 @@ Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetCo
       return moving_refusal(
           "the scale cannot be determined: all lengths grow with the path",
           "give the distance of two located cameras (--distance 1:2:12.5), or the target's path (--truth)");
-    case PlacedStatus::truth_misfits:
-      return moving_refusal("the path that was seen is not the true path given, whatever its scale",
-                            config.clock_search_s > 0.0
-                                ? "check that --truth is of the same flight and metres"
-                                : "give --clocks SECONDS where the true path has a clock of its own");
     case PlacedStatus::no_convergence:
-      if (!(config.clock_search_s > 0.0))
-        return moving_refusal(
-            "no path fits what the cameras saw by one clock",
-            "give --clocks SECONDS where each camera has its own clock; check the lenses, and that one "
-            "target only is in the table");
+      if (!searches_clocks) return refusal_of_clocks(report.status, false);
       return {State::not_converged,
               ExitCode::no_convergence,
               "the estimate does not settle",
               "check the lenses and that one target only is in the table",
               {}};
     case PlacedStatus::placed:
-      break;
+      return {};
+    default:
+      return refusal_of_clocks(report.status, searches_clocks);
   }
-  return {};
 }
 
 /// The largest distance of two located cameras.

@@ -54,47 +54,57 @@ FieldList word_fields(ObserveConfig& config) {
 }
 
 FieldList number_fields(ObserveConfig& config) {
-  return {{.name = "square_pixels", .value = &config.square_pixels, .help = "fx = fy"},
-          {.name = "no_zoom",
-           .value = &config.no_zoom,
-           .help = "The camera does not zoom: what seems a zoom is something else"},
-          {.name = "fixed_centre",
-           .value = &config.fixed_centre,
-           .help = "cx, cy fixed: the initial guess's, or the image's centre",
-           .option = "--fix-centre"},
-          {.name = "lever_m",
-           .value = vector_code<3>(config.lever_m),
-           .help = "Camera centre from the centre of rotation, x,y,z in the camera frame [m]",
-           .form = "NUMBER"},
-          {.name = "sigma_px",
-           .value = &config.sigma_px,
-           .help = "σ of a pixel coordinate [px] (default: estimated from the residuals)",
-           .limits = positive,
-           .option = "--sigma-px"},
-          {.name = "sigma_angle_rad",
-           .value = &config.sigma_angle_rad,
-           .help = "σ of an encoder or attitude angle [rad]",
-           .limits = positive},
-          {.name = "sigma_rate_rad_per_s",
-           .value = &config.sigma_rate_rad_per_s,
-           .help = "σ of a rate [rad/s]",
-           .limits = positive,
-           .option = "--sigma-rate"},
-          {.name = "sigma_range_m",
-           .value = &config.sigma_range_m,
-           .help = "σ of the column range_m [m]",
-           .limits = positive,
-           .option = "--sigma-range-m"},
-          {.name = "sigma_scale",
-           .value = &config.sigma_scale,
-           .help = "σ of the scale of the measured angles or rates, relative; 0: exact",
-           .limits = relative,
-           .option = "--sigma-encoder-scale"},
-          {.name = "sigma_parallax",
-           .value = &config.sigma_parallax,
-           .help = "σ of how far the camera centre is from the axes, over the distance of the points; 0: exact",
-           .limits = relative},
-          {.name = "window_s",
+  return {
+      {.name = "square_pixels", .value = &config.square_pixels, .help = "fx = fy"},
+      {.name = "no_zoom",
+       .value = &config.no_zoom,
+       .help = "The camera does not zoom: what seems a zoom is something else"},
+      {.name = "fixed_centre",
+       .value = &config.fixed_centre,
+       .help = "cx, cy fixed: the initial guess's, or the image's centre",
+       .option = "--fix-centre"},
+      {.name = "lever_m",
+       .value = vector_code<3>(config.lever_m),
+       .help = "Camera centre from the centre of rotation, x,y,z in the camera frame [m]",
+       .form = "NUMBER"},
+  };
+}
+
+FieldList sigma_fields(ObserveConfig& config) {
+  return {
+      {.name = "sigma_px",
+       .value = &config.sigma_px,
+       .help = "σ of a pixel coordinate [px] (default: estimated from the residuals)",
+       .limits = positive,
+       .option = "--sigma-px"},
+      {.name = "sigma_angle_rad",
+       .value = &config.sigma_angle_rad,
+       .help = "σ of an encoder or attitude angle [rad]",
+       .limits = positive},
+      {.name = "sigma_rate_rad_per_s",
+       .value = &config.sigma_rate_rad_per_s,
+       .help = "σ of a rate [rad/s]",
+       .limits = positive,
+       .option = "--sigma-rate"},
+      {.name = "sigma_range_m",
+       .value = &config.sigma_range_m,
+       .help = "σ of the column range_m [m]",
+       .limits = positive,
+       .option = "--sigma-range-m"},
+      {.name = "sigma_scale",
+       .value = &config.sigma_scale,
+       .help = "σ of the scale of the measured angles or rates, relative; 0: exact",
+       .limits = relative,
+       .option = "--sigma-encoder-scale"},
+      {.name = "sigma_parallax",
+       .value = &config.sigma_parallax,
+       .help = "σ of how far the camera centre is from the axes, over the distance of the points; 0: exact",
+       .limits = relative},
+  };
+}
+
+FieldList length_fields(ObserveConfig& config) {
+  return {{.name = "window_s",
            .value = &config.window_s,
            .help = "Length of --method window [s]",
            .limits = positive,
@@ -110,7 +120,8 @@ FieldList number_fields(ObserveConfig& config) {
 
 FieldList fields_of(ObserveConfig& config) {
   FieldList fields = word_fields(config);
-  for (Field& field : number_fields(config)) fields.push_back(std::move(field));
+  for (FieldList more : {number_fields(config), sigma_fields(config), length_fields(config)})
+    for (Field& field : more) fields.push_back(std::move(field));
   return fields;
 }
 

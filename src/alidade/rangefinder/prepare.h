@@ -27,4 +27,9 @@ inline constexpr double guessed_sigma_m = 0.002;
 [[nodiscard]] Preparation prepare_shots(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                                         const Camera& camera, const RangefinderConfig& config);
 
+/// What is known of the shots before anything is solved: none is used yet.
+[[nodiscard]] RangefinderReport report_before_solving(const Preparation& ready, std::span<const Shot> shots,
+                                                      std::span<const Eigen::Vector3d> points_in_board,
+                                                      const Camera& camera, const RangefinderConfig& config);
+
 }  // namespace alidade

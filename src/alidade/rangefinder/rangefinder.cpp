@@ -355,22 +355,7 @@ RangefinderReport calibrate_rangefinder(std::span<const Shot> shots, std::span<c
                                         const Progress& progress) {
   Preparation ready = prepare_shots(shots, points_in_board, camera, config);
   BeamProblem& problem = ready.problem;
-  RangefinderReport report;
-  report.camera = camera;
-  report.scale_by_need = config.scale_by_need;
-  report.sigma_corner_px = ready.sigma_corner_px;
-  report.sigma_spot_px = config.sigma_spot_px.value_or(guessed_sigma_px);
-  report.spot_sigma_is_estimated = !ready.knows_spot_sigma;
-  report.range_sigma_is_estimated = !ready.knows_range_sigma;
-  report.shots.resize(shots.size());
-  for (std::size_t i = 0; i < shots.size(); ++i) report.shots[i].reason = ready.reasons[i];
-  const bool is_flat =
-      std::ranges::all_of(points_in_board, [](const Eigen::Vector3d& point) { return point.z() == 0.0; });
-  report.boards_behind = static_cast<int>(std::ranges::count_if(problem.shots, [&](const PreparedShot& shot) {
-    // z of the board points away from who sees its printed side.
-    return is_flat && shot.board && shot.pose && shot.pose->cam_from_board.inverse().translation.z() > 0.0;
-  }));
-  report.shots_dropped = static_cast<int>(shots.size());
+  RangefinderReport report = report_before_solving(ready, shots, points_in_board, camera, config);
   const bool has_planes =
       std::any_of(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used && shot.plane; });
   if (config.estimate_scale && !has_planes) {

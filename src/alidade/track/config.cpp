@@ -25,10 +25,9 @@ TextCode gravity_code(std::optional<Eigen::Vector3d>& vector) {
   return numbers_code(3, values, [&vector](const std::vector<double>& xyz) { vector = Eigen::Vector3d(xyz.data()); });
 }
 
-}  // namespace
+constexpr Limits positive{.min = 0.0, .max = 1e6, .is_above_min = true};
 
-FieldList fields_of(TrackConfig& config) {
-  constexpr Limits positive{.min = 0.0, .max = 1e6, .is_above_min = true};
+FieldList model_fields(TrackConfig& config) {
   return {
       {.name = "method",
        .value = words_code(config.method, track_method_words()),
@@ -51,6 +50,11 @@ FieldList fields_of(TrackConfig& config) {
        .value = &config.smooth_s,
        .help = "Also smoothed.csv: the path given the observations until so long after [s]; not for imm",
        .limits = {0.01, 2.0}},
+  };
+}
+
+FieldList sigma_fields(TrackConfig& config) {
+  return {
       {.name = "sigma_a_m_s2",
        .value = &config.sigma_a_m_s2,
        .help = "The target's acceleration [m/s2] (default: estimated from the innovations)",
@@ -68,6 +72,11 @@ FieldList fields_of(TrackConfig& config) {
        .value = &config.sigma_angle_rad,
        .help = "σ of an encoder of which the rig states none [rad]",
        .limits = positive},
+  };
+}
+
+FieldList range_fields(TrackConfig& config) {
+  return {
       {.name = "min_depth_m", .value = &config.min_depth_m, .help = "Working range, nearest [m]", .limits = positive},
       {.name = "max_depth_m", .value = &config.max_depth_m, .help = "Working range, furthest [m]", .limits = positive},
       {.name = "keep_rows",
@@ -75,6 +84,15 @@ FieldList fields_of(TrackConfig& config) {
        .help = "Of rows from standard input: how many of the newest the final result covers at least; at most twice as "
                "many",
        .limits = {.min = 100, .max = 1e9}}};
+}
+
+}  // namespace
+
+FieldList fields_of(TrackConfig& config) {
+  FieldList fields = model_fields(config);
+  for (const FieldList& more : {sigma_fields(config), range_fields(config)})
+    fields.insert(fields.end(), more.begin(), more.end());
+  return fields;
 }
 
 void require_sense(TrackConfig config) {

@@ -5,7 +5,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/localize/checks/judge.h"
 
-// What is said of sensors beside the camera.
+// What is said of an IMU beside the camera.
 
 namespace alidade {
 namespace {
@@ -30,6 +30,39 @@ std::string misfit_text(const ImuEstimate& imu) {
   return what + ": check the axes and units of the accelerometer";
 }
 
+std::string rate_fault_text(const ImuEstimate& imu) {
+  switch (imu.fault) {
+    case ImuFault::rate_degrees:
+      return "the IMU's angular rates are in degrees per second, not rad/s";
+    case ImuFault::rate_unit:
+      return "the camera rotates " + text_of(imu.ratio) +
+             " times as fast as the IMU's angular rates say: another unit?";
+    case ImuFault::mirrored:
+      return "the IMU's axes are left-handed: one has the wrong sign, or two are exchanged";
+    case ImuFault::mounting:
+      return mounting_text(imu);
+    case ImuFault::unmounted:
+      return "no mounting of the IMU is given, and the camera rotates too little to determine it";
+    default:
+      return "the IMU's angular rates and the camera's rotations have nothing in common: another recording, or a clock "
+             "that is off by more than a second";
+  }
+}
+
+std::string force_fault_text(const ImuEstimate& imu) {
+  switch (imu.fault) {
+    case ImuFault::force_g:
+      return "the IMU's forces are in g, not m/s²";
+    case ImuFault::force_unit:
+      return "the IMU's mean force is " + text_of(imu.ratio) + " times gravity: another unit?";
+    case ImuFault::no_gravity:
+      return "gravity has been subtracted from the IMU's forces (on average " + text_of(imu.ratio) +
+             " of it is left): they have to be as the accelerometer reads them";
+    default:
+      return "the IMU's forces have the other sign: at rest the axis that points upwards reads +9.81 m/s²";
+  }
+}
+
 }  // namespace
 
 std::string imu_fault_text(const ImuEstimate& imu) {
@@ -42,28 +75,17 @@ std::string imu_fault_text(const ImuEstimate& imu) {
       return "too few of the IMU's readings are of the time of the path, between gaps: a scale needs some three "
              "seconds";
     case ImuFault::rate_degrees:
-      return "the IMU's angular rates are in degrees per second, not rad/s";
     case ImuFault::rate_unit:
-      return "the camera rotates " + text_of(imu.ratio) +
-             " times as fast as the IMU's angular rates say: another unit?";
     case ImuFault::mirrored:
-      return "the IMU's axes are left-handed: one has the wrong sign, or two are exchanged";
     case ImuFault::mounting:
-      return mounting_text(imu);
     case ImuFault::unmounted:
-      return "no mounting of the IMU is given, and the camera rotates too little to determine it";
     case ImuFault::other_motion:
-      return "the IMU's angular rates and the camera's rotations have nothing in common: another recording, or a clock "
-             "that is off by more than a second";
+      return rate_fault_text(imu);
     case ImuFault::force_g:
-      return "the IMU's forces are in g, not m/s²";
     case ImuFault::force_unit:
-      return "the IMU's mean force is " + text_of(imu.ratio) + " times gravity: another unit?";
     case ImuFault::no_gravity:
-      return "gravity has been subtracted from the IMU's forces (on average " + text_of(imu.ratio) +
-             " of it is left): they have to be as the accelerometer reads them";
     case ImuFault::reversed:
-      return "the IMU's forces have the other sign: at rest the axis that points upwards reads +9.81 m/s²";
+      return force_fault_text(imu);
     case ImuFault::still:
       return "the camera accelerates too little for the IMU to determine the scale";
     case ImuFault::misfit:
@@ -111,20 +133,6 @@ void add_imu(const Localization& report, Verdict& verdict) {
                                   std::string(imu.force_noise_factor > imu.rate_noise_factor ? "forces" : "rates") +
                                   " is " + text_of(noise, 2) + " times the given one; σ is enlarged for it",
                               noise, much, "1", "path"});
-}
-
-void add_sensor_readings(const SensorScale& sensor, Verdict& verdict) {
-  constexpr double fast = 5.0;
-  if (sensor.acceleration > fast)
-    verdict.checks.push_back({sensor.sensor + " unit", State::care,
-                              "by the " + sensor.sensor + " the camera accelerates " + text_of(sensor.acceleration, 2) +
-                                  " times as much as --sigma-a says: are its readings in metres?",
-                              sensor.acceleration, fast, "1", "path"});
-  if (sensor.late_s != 0.0)
-    verdict.checks.push_back({sensor.sensor + " clock", State::care,
-                              "the clock of the " + sensor.sensor + " is " + text_of(std::abs(sensor.late_s), 2) +
-                                  " s " + (sensor.late_s > 0.0 ? "after" : "before") + " the camera's: corrected",
-                              std::abs(sensor.late_s), 0.0, "s", "path"});
 }
 
 }  // namespace alidade

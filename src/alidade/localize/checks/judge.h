@@ -15,8 +15,13 @@ namespace alidade {
 /// Checks of those that have.
 void add_imu(const Localization& report, Verdict& verdict);
 
-/// Readings that are not in metres, or of another clock.
-void add_sensor_readings(const SensorScale& sensor, Verdict& verdict);
+/// The sensors that say how long the path is: "depth sensor, ± 0.2 %".
+[[nodiscard]] std::string sensors_text(const Localization& report);
+/// What sensors beside the camera say of a scale that is known without them, and two of them of each other.
+void add_sensors(const Localization& report, Verdict& verdict);
+
+/// Bad above `bad`, else care above `care`.
+[[nodiscard]] State state_of(double value, double care, double bad);
 
 /// |z| of what a score asks, with what anybody would believe of a lens: of one about which the observations know less
 /// than that, as those of a still camera, nothing is said.

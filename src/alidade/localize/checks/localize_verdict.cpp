@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "alidade/localize/checks/judge.h"
@@ -10,6 +11,9 @@ namespace {
 
 constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, max_nis = 4.0;
 constexpr double bad_gated = 0.5, max_known_gated = 0.8, max_gated = 0.6, care_lost = 1.0 / 3.0, max_lost = 0.5;
+
+double lost_share(const Localization& report) { return share(report.num_lost, report.path.size()); }
+double gated_share(const Localization& report) { return share(report.num_gated, report.num_used + report.num_gated); }
 
 Verdict stopped(State state, ExitCode code, std::string sentence, std::string to_add) {
   return {state, code, std::move(sentence), std::move(to_add), {}};
@@ -36,10 +40,6 @@ Verdict never_started(const Localization& report) {
         report.is_of_images ? "look at something with corners, in light" : "track more points");
   return undetermined("the target is not found: four of its points, not on a line, are never seen where they belong",
                       "begin in front of the target, or give --start");
-}
-
-State state_of(double value, double care, double bad) {
-  return value > bad ? State::bad : value > care ? State::care : State::good;
 }
 
 /// What only the truth shows: a path may fit its own map well and be elsewhere. An alignment only takes errors away, so
@@ -140,7 +140,7 @@ void add_given(const Localization& report, Verdict& verdict) {
     verdict.checks.push_back({"camera", state_of(z, care_z, bad_z), cause_text(*worst), z, care_z, "σ", "path"});
   if (report.given_camera) {
     constexpr double much = 0.2;
-    const double gated = share(report.num_gated, report.num_used + report.num_gated);
+    const double gated = gated_share(report);
     const bool is_no_cause = !report.is_of_images && (gated > much || report.nis_per_dof > good_nis_high);
     verdict.checks.push_back(
         {"camera", is_no_cause ? State::bad : State::care,
@@ -228,62 +228,9 @@ void add_side(const Localization& report, Verdict& verdict) {
       "check that x goes right and y down as the target is seen; if +z is its front, say 'seen_from: +z' in --target";
 }
 
-/// "depth sensor, ± 0.2 %"
-std::string sensors_text(const Localization& report) {
-  std::string text;
-  double weights = 0.0;
-  for (const SensorScale& each : report.sensor_scales) {
-    if (!(each.sigma_rel > 0.0)) continue;
-    text += (text.empty() ? "" : " and the ") + each.sensor;
-    weights += 1.0 / (each.sigma_rel * each.sigma_rel);
-  }
-  return text + ", ± " + text_of(100.0 / std::sqrt(weights), 2) + " %";
-}
-
-/// What sensors beside the camera say of a scale that is known without them, and two of them of each other.
-void add_sensors(const Localization& report, Verdict& verdict) {
-  constexpr double care_z = 3.0, bad_z = 6.0, many_rejected = 0.2;
-  const SensorScale* first = nullptr;
-  for (const SensorScale& each : report.sensor_scales) {
-    if (!(each.sigma_rel > 0.0)) {
-      if (each.sensor == "IMU") {
-        verdict.checks.push_back({each.sensor, State::care, imu_fault_text(*report.imu), 0.0, 0.0, "", "path"});
-        continue;
-      }
-      verdict.checks.push_back({each.sensor, State::care,
-                                "the readings of the " + each.sensor + " do not determine the scale: " +
-                                    (!each.is_in_time            ? "none of them is of the time of the path (t_s)"
-                                     : each.sensor == "odometry" ? "too few of them, or the camera hardly moves"
-                                     : each.sensor == "depth sensor"
-                                         ? "too few of them, or the camera moves too little up and down"
-                                         : "too few of them, or too few points around the beam that lie on a surface"),
-                                0.0, 0.0, "", "path"});
-      continue;
-    }
-    add_sensor_readings(each, verdict);
-    const double given_scale = report.is_scale_read ? (first ? first->scale : each.scale) : 1.0;
-    const double sigma = std::hypot(each.sigma_rel, report.is_scale_read && first ? first->sigma_rel : 0.0);
-    const double change = std::log(each.scale / given_scale), z = std::abs(change) / sigma;
-    const std::string by = report.is_scale_read && first ? "the " + first->sensor : "the target";
-    const double rejected = share(each.num_rejected, each.num_used + each.num_rejected);
-    if (!report.is_scale_read || first)
-      verdict.checks.push_back({each.sensor, state_of(z, care_z, bad_z),
-                                z > care_z ? "the path is " + text_of(100.0 * change, 2) + " % longer by the " +
-                                                 each.sensor + " than by " + by + " (" + text_of(z, 2) + "σ)"
-                                           : "the " + each.sensor + " agrees with " + by + " on the scale",
-                                z, care_z, "σ", "path"});
-    if (rejected > many_rejected)
-      verdict.checks.push_back(
-          {each.sensor + " readings", State::care,
-           text_of(100.0 * rejected, 2) + " % of the readings of the " + each.sensor + " are rejected", rejected,
-           many_rejected, "1", "path"});
-    if (first == nullptr) first = &each;
-  }
-}
-
-void add_checks(const Localization& report, Verdict& verdict) {
+void add_innovations(const Localization& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
-  const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
+  const State state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
   const std::string px = text_of(report.sigma_px, 2) + " px";
   const std::string low = report.is_of_images ? "matches are better than the " + px +
                                                     " that they are taken for, and σ is too large "
@@ -292,22 +239,39 @@ void add_checks(const Localization& report, Verdict& verdict) {
   const std::string said = nis > good_nis_high  ? "the observations do not fit: the lens or the noise is not as stated"
                            : nis < good_nis_low ? low
                                                 : "innovations as large as predicted";
-  verdict.checks.push_back({"innovations", nis_state, "NIS " + text_of(nis, 3) + " per degree of freedom: " + said, nis,
+  verdict.checks.push_back({"innovations", state, "NIS " + text_of(nis, 3) + " per degree of freedom: " + said, nis,
                             good_nis_high, "1", "nis"});
-  const double lost = share(report.num_lost, report.path.size());
+}
+
+/// Frames without a pose, and observations that were not believed.
+void add_losses(const Localization& report, Verdict& verdict) {
+  const double lost = lost_share(report);
   verdict.checks.push_back({"frames lost", state_of(lost, 0.0, care_lost),
                             report.num_lost == 0 ? "no frame lost" : std::to_string(report.num_lost) + " frames lost",
                             lost, care_lost, "1", "tracks"});
-  const double gated = share(report.num_gated, report.num_used + report.num_gated);
+  const double gated = gated_share(report);
   verdict.checks.push_back({"gated", state_of(gated, 0.05, bad_gated),
                             text_of(100.0 * gated, 3) + " % of the observations are rejected", gated, bad_gated, "1",
                             "tracks"});
-  const double known_gated = share(report.num_known_gated, report.num_known);
+  if (report.num_known == 0) return;
   // Known points may be mismatched as often as others; if more often, they are not where they are said to be.
-  if (report.num_known > 0)
-    verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
-                              text_of(100.0 * known_gated, 3) + " % of the target's observations are rejected",
-                              known_gated, 0.1, "1", "tracks"});
+  const double known_gated = share(report.num_known_gated, report.num_known);
+  verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
+                            text_of(100.0 * known_gated, 3) + " % of the target's observations are rejected",
+                            known_gated, 0.1, "1", "tracks"});
+}
+
+std::string scale_text(const Localization& report) {
+  if (report.is_scale_read) return "scale from the " + sensors_text(report);
+  if (report.scale_known)
+    return report.is_in_map ? "scale and frame are those of the map" : "scale from the known points";
+  if (report.is_in_map) return "scale unknown: the path's unit is that of the map";
+  if (report.has_target) return "none of the target's points is seen: scale and frame are those of the start";
+  return "scale unknown: the path is up to scale, its unit is the depth at the start";
+}
+
+/// Where the map stands, and how large it is.
+void add_frame(const Localization& report, Verdict& verdict) {
   constexpr double max_shift = 3.0;  // χ² of a rectangle's twelve components over their count: 99.9 % is 2.7
   if (report.known_shift > max_shift)
     verdict.checks.push_back({"map's frame", State::care,
@@ -316,14 +280,11 @@ void add_checks(const Localization& report, Verdict& verdict) {
                                   "less sure than its σ says",
                               report.known_shift, max_shift, "1", "path"});
   verdict.checks.push_back(
-      {"scale", report.scale_known ? State::good : State::care,
-       report.is_scale_read ? "scale from the " + sensors_text(report)
-       : report.scale_known
-           ? (report.is_in_map ? "scale and frame are those of the map" : "scale from the known points")
-       : report.is_in_map  ? "scale unknown: the path's unit is that of the map"
-       : report.has_target ? "none of the target's points is seen: scale and frame are those of the start"
-                           : "scale unknown: the path is up to scale, its unit is the depth at the start",
-       0.0, 0.0, "", "path"});
+      {"scale", report.scale_known ? State::good : State::care, scale_text(report), 0.0, 0.0, "", "path"});
+}
+
+/// What of the images was not looked at.
+void add_masks(const Localization& report, Verdict& verdict) {
   if (report.lacks_circle)
     verdict.checks.push_back(
         {"mask", State::care, "--mask circle: no image shows a circle, and nothing is masked", 0.0, 0.0, "", "tracks"});
@@ -332,35 +293,32 @@ void add_checks(const Localization& report, Verdict& verdict) {
                               text_of(100.0 * report.still_share, 2) +
                                   " % of the image are edges that never move while the scene does: masked",
                               report.still_share, 0.0, "1", "tracks"});
+}
+
+void add_restarts(const Localization& report, Verdict& verdict) {
   if (report.num_restarts > 0)
     verdict.checks.push_back({"restarts", restarts_state(report), restarts_text(report),
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});
-  add_sensors(report, verdict);
-  add_imu(report, verdict);
-  add_given(report, verdict);
-  add_radial(report, verdict);
-  add_residuals(report, verdict);
-  add_filter_alone(report, verdict);
-  add_tilt(report, verdict);
-  add_side(report, verdict);
-  add_truth(report, verdict);
 }
 
-}  // namespace
+/// Of a path, in the order in which its report has them.
+void add_checks(const Localization& report, Verdict& verdict) {
+  for (const auto add : {add_innovations, add_losses, add_frame, add_masks, add_restarts, add_sensors, add_imu,
+                         add_given, add_radial, add_residuals, add_filter_alone, add_tilt, add_side, add_truth})
+    add(report, verdict);
+}
 
-Verdict localize_verdict(const Localization& report) {
-  const std::size_t num_frames = report.path.size();
-  const bool has_started = std::ranges::any_of(report.path, &PathStep::has_pose);
-  if (!has_started) return never_started(report);
+/// Why what came of the frames is no path.
+std::optional<Verdict> refusal(const Localization& report) {
+  if (std::ranges::none_of(report.path, &PathStep::has_pose)) return never_started(report);
   if (report.num_used == 0 || report.max_seen < 3)
     return stopped(State::refused, ExitCode::undetermined,
                    "too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
                    "track more points");
-  const double gated = share(report.num_gated, report.num_used + report.num_gated);
-  const double lost = share(report.num_lost, num_frames);
   const bool is_finite = std::ranges::all_of(report.path, [](const PathStep& step) {
     return !step.has_pose() || (step.world_from_cam.translation.allFinite() && step.cov.allFinite());
   });
+  const double gated = gated_share(report);
   if (!is_finite || report.nis_per_dof > max_nis || gated > max_gated)
     return stopped(State::not_converged, ExitCode::no_convergence,
                    "no path fits the observations: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
@@ -373,18 +331,30 @@ Verdict localize_verdict(const Localization& report) {
                    "the target is not where it is given: " + text_of(100.0 * known_gated, 3) +
                        " % of its observations do not fit the path",
                    "check the points' numbers and positions in --target");
-  if (lost > max_lost)
+  if (lost_share(report) > max_lost)
     return stopped(State::refused, ExitCode::undetermined,
-                   "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
+                   "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(report.path.size()) +
                        " frames have fewer than three points that fit",
                    "track more points, and keep the target in view for longer");
   if (report.is_behind && report.is_board)
     return stopped(State::refused, ExitCode::undetermined,
                    "mirrored: the observations put the camera behind the printed side of the board",
                    "check that the images are not mirrored, and the order of the board's corners");
+  return std::nullopt;
+}
+
+}  // namespace
+
+State state_of(double value, double care, double bad) {
+  return value > bad ? State::bad : value > care ? State::care : State::good;
+}
+
+Verdict localize_verdict(const Localization& report) {
+  if (auto refused = refusal(report)) return *std::move(refused);
   Verdict verdict;
   add_checks(report, verdict);
   for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);
+  const std::size_t num_frames = report.path.size();
   verdict.sentence =
       "localised in " + std::to_string(num_frames - report.num_lost) + " of " + std::to_string(num_frames) + " frames";
   for (const Check& check : verdict.checks) {

@@ -81,12 +81,15 @@ class BackwardPath {
   /// it.
   bool take(const ObservationFrame& frame, const PathStep& path);
 
-  void give_back();  ///< The frame taken last.
+  /// All frames down to the first, and those before it that a target holds. The number of the last one taken.
+  std::size_t take_back(std::span<const ObservationFrame> frames, std::span<const PathStep> path,
+                        std::size_t first_frame);
 
   std::vector<Rigid3> world_from_cam;                      ///< Last frame first.
   std::vector<std::vector<UsedObservation>> observations;  ///< Frames counted from none.
 
  private:
+  void give_back();  ///< The frame taken last.
   /// A given point may be further from the map's frame than its own σ: a filter that took it for mismatched lost it.
   [[nodiscard]] static Eigen::Matrix3d cov_of(const LocalizationFilter& filter, const SmootherPoint& point) {
     const auto place = filter.place(point.id);
@@ -139,6 +142,21 @@ bool BackwardPath::take(const ObservationFrame& frame, const PathStep& path) {
   return found && found->num_fit >= min_fit && 2 * found->num_fit > placed.size();
 }
 
+std::size_t BackwardPath::take_back(std::span<const ObservationFrame> frames, std::span<const PathStep> path,
+                                    std::size_t first_frame) {
+  std::size_t first = path.size();
+  while (first > first_frame) {
+    --first;
+    (void)take(frames[first], path[first]);
+  }
+  for (; first > 0 && !config_.start && !config_.target.points.empty(); --first) {
+    if (take(frames[first - 1], path[first - 1])) continue;
+    give_back();
+    break;
+  }
+  return first;
+}
+
 void BackwardPath::give_back() {
   world_from_cam.pop_back();
   observations.pop_back();
@@ -160,6 +178,24 @@ void rescale(SmootherProblem& problem) {
   if (!(scale > 0.0) || !std::isfinite(scale)) return;
   for (Rigid3& pose : problem.world_from_cam) pose.translation *= scale;
   for (SmootherPoint& point : problem.points) point.point_in_world *= scale;
+}
+
+/// Times, poses and observations in their order. The points that are seen.
+std::set<long> add_frames(const BackwardPath& back, std::span<const PathStep> path, const std::set<std::size_t>& jumps,
+                          SmootherProblem& problem) {
+  std::set<long> seen;
+  for (std::size_t k = 0; k < back.world_from_cam.size(); ++k) {
+    const std::size_t at = back.world_from_cam.size() - 1 - k, frame = problem.first_frame + k;
+    problem.t_s.push_back(path[frame].t_s);
+    problem.is_jump.push_back(jumps.contains(frame));
+    problem.world_from_cam.push_back(back.world_from_cam[at]);
+    for (UsedObservation observation : back.observations[at]) {
+      observation.frame = k;
+      seen.insert(observation.id);
+      problem.observations.push_back(observation);
+    }
+  }
+  return seen;
 }
 
 }  // namespace
@@ -234,6 +270,19 @@ void ObservationRecord::add_gone(const LocalizeConfig& config, std::span<const G
   }
 }
 
+/// What holds the world: a start, a target, or the first camera.
+void ObservationRecord::give_frame(const LocalizeConfig& config, const std::optional<StartHypothesis>& start,
+                                   SmootherProblem& problem) const {
+  const bool has_target = !config.target.points.empty();
+  if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else the observations contradicted it
+  if (config.start || has_target) return;
+  problem.gauge = PathGauge::similarity;
+  rescale(problem);
+  if (!start || problem.start) return;
+  problem.start = start;  // however often the filter began again: one camera is the world
+  problem.start->motion.world_from_cam = problem.world_from_cam.front();
+}
+
 std::optional<SmootherProblem> ObservationRecord::problem(
     const Camera& camera, const LocalizeConfig& config, std::span<const ObservationFrame> frames,
     std::span<const PathStep> path, const LocalizationFilter& filter, std::span<const GonePoint> gone,
@@ -245,46 +294,17 @@ std::optional<SmootherProblem> ObservationRecord::problem(
   const double most = max_points_at_once(frames.size()) * (has_loops ? of_all : 1.0);
   if (!thin(frames, most, problem.points)) return std::nullopt;
   BackwardPath back(camera, config, filter, gone, problem);
-  std::size_t first = path.size();
-  while (first > first_frame_) {
-    --first;
-    (void)back.take(frames[first], path[first]);
-  }
-  const bool has_target = !config.target.points.empty();
-  for (; first > 0 && !config.start && has_target; --first) {
-    if (back.take(frames[first - 1], path[first - 1])) continue;
-    back.give_back();
-    break;
-  }
-  problem.first_frame = first;
-  for (SmootherPoint& point : problem.points) point.first_frame -= point.range ? first : 0;
-  std::set<long> seen;
-  for (std::size_t k = 0; k < back.world_from_cam.size(); ++k) {
-    const std::size_t at = back.world_from_cam.size() - 1 - k;
-    problem.t_s.push_back(path[first + k].t_s);
-    problem.is_jump.push_back(jumps_.contains(first + k));
-    problem.world_from_cam.push_back(back.world_from_cam[at]);
-    for (UsedObservation observation : back.observations[at]) {
-      observation.frame = k;
-      seen.insert(observation.id);
-      problem.observations.push_back(observation);
-    }
-  }
+  problem.first_frame = back.take_back(frames, path, first_frame_);
+  for (SmootherPoint& point : problem.points) point.first_frame -= point.range ? problem.first_frame : 0;
+  const std::set<long> seen = add_frames(back, path, jumps_, problem);
   std::erase_if(problem.points, [&](const SmootherPoint& point) { return !seen.contains(point.id); });
   std::ranges::sort(problem.points, {}, &SmootherPoint::id);
+  const bool has_target = !config.target.points.empty();
   if (has_target &&
       std::ranges::none_of(problem.points, [](const SmootherPoint& point) { return point.given_in_world.has_value(); }))
     return std::nullopt;
   problem.camera = camera;
-  if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else the observations contradicted it
-  if (!config.start && !has_target) {
-    problem.gauge = PathGauge::similarity;
-    rescale(problem);
-    if (start && !problem.start) {  // however often the filter began again: one camera is the world
-      problem.start = start;
-      problem.start->motion.world_from_cam = problem.world_from_cam.front();
-    }
-  }
+  give_frame(config, start, problem);
   problem.sigma_speed_m_s = config.sigma_speed_m_s;
   problem.sigma_rate_rad_s = config.sigma_rate_rad_s;
   problem.period_s = period_s;

@@ -57,6 +57,8 @@ class ObservationRecord {
     RangePrior range;
   };
   void add_points(const LocalizeConfig& config, const LocalizationFilter& filter, SmootherProblem& problem) const;
+  void give_frame(const LocalizeConfig& config, const std::optional<StartHypothesis>& start,
+                  SmootherProblem& problem) const;
   void add_gone(const LocalizeConfig& config, std::span<const GonePoint> gone, SmootherProblem& problem) const;
   /// Without a target and a start the supposed distances of the first points are the unit of length.
   [[nodiscard]] bool sets_unit(const LocalizeConfig& config, std::size_t frame) const {

@@ -10,6 +10,22 @@ struct Pair {
   Rigid3 estimated, truth;
 };
 
+/// RPE: between neighbours, with the aligned scale.
+void add_steps(std::span<const Pair> pairs, PathError& error) {
+  double steps2 = 0.0, turns2 = 0.0;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    Rigid3 step = pairs[i - 1].estimated.inverse() * pairs[i].estimated;
+    step.translation *= error.scale;
+    const Rigid3 true_step = pairs[i - 1].truth.inverse() * pairs[i].truth;
+    const Rigid3 difference = true_step.inverse() * step;
+    steps2 += difference.translation.squaredNorm();
+    turns2 += log_so3(difference.rotation).squaredNorm();
+  }
+  const double num = static_cast<double>(pairs.size()) - 1.0;
+  error.rpe_m = std::sqrt(steps2 / num);
+  error.rpe_rad = std::sqrt(turns2 / num);
+}
+
 }  // namespace
 
 const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s, double tolerance_s) {
@@ -50,17 +66,7 @@ PathError path_error(std::span<const TimedPose> estimated, std::span<const Timed
     sum2 += (moved - b[i]).squaredNorm();
   }
   error.ate_m = std::sqrt(sum2 / num);
-  double steps2 = 0.0, turns2 = 0.0;
-  for (std::size_t i = 1; i < pairs.size(); ++i) {
-    Rigid3 step = pairs[i - 1].estimated.inverse() * pairs[i].estimated;
-    step.translation *= fit->scale;
-    const Rigid3 true_step = pairs[i - 1].truth.inverse() * pairs[i].truth;
-    const Rigid3 difference = true_step.inverse() * step;
-    steps2 += difference.translation.squaredNorm();
-    turns2 += log_so3(difference.rotation).squaredNorm();
-  }
-  error.rpe_m = std::sqrt(steps2 / (num - 1.0));
-  error.rpe_rad = std::sqrt(turns2 / (num - 1.0));
+  add_steps(pairs, error);
   return error;
 }
 

@@ -186,40 +186,51 @@ void PathSmoother::add_acceleration(const Surroundings& around, const WindowRows
   chain.b += squares * around.by_border;
 }
 
-/// Speed and rate from frame k to the next, and from there to the one after it, differ by drawn accelerations; the
-/// first differ from what was given. A jump determines nothing, and behind it they begin again.
-void PathSmoother::add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
-  const auto steps = [&](std::size_t i) {
-    return std::max(1.0, std::round((problem_.t_s[i + 1] - problem_.t_s[i]) / problem_.period_s));
-  };
-  Eigen::Vector<double, 6> step_variance;
-  step_variance << Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_a_m_s2 * problem_.period_s, 2)),
+/// Of how many times its accelerations are drawn from a frame to the next.
+double PathSmoother::num_steps(std::size_t k) const {
+  return std::max(1.0, std::round((problem_.t_s[k + 1] - problem_.t_s[k]) / problem_.period_s));
+}
+
+/// Of a change of speed and rate by one draw.
+Eigen::Vector<double, 6> PathSmoother::step_variance() const {
+  Eigen::Vector<double, 6> variance;
+  variance << Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_a_m_s2 * problem_.period_s, 2)),
       Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_alpha_rad_s2 * problem_.period_s, 2));
+  return variance;
+}
+
+/// The first speeds differ from what was given.
+void PathSmoother::add_first_speeds(const Speeds& first, std::size_t k, SmootherSystem& system) const {
+  Eigen::Vector<double, 6> given = Eigen::Vector<double, 6>::Zero(), variance;
+  variance << Eigen::Vector3d::Constant(std::pow(problem_.sigma_speed_m_s, 2)),
+      Eigen::Vector3d::Constant(std::pow(problem_.sigma_rate_rad_s, 2));
+  if (problem_.start && k == 0) {
+    given << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
+    variance = problem_.start->cov.diagonal().tail<6>();
+  }
+  constexpr double any_m_s = 5.0;  // an IMU's path is in metres; what was supposed of its speed is not
+  if (problem_.imu) variance.head<3>().array() += any_m_s * any_m_s;
+  WindowRows J = WindowRows::Zero();
+  J.leftCols<6>() = first.J_from;
+  J.middleCols<6>(6) = first.J_to;
+  add_window(J, first.values - given, variance + walked_before(num_steps(k)) * step_variance(), system);
+}
+
+/// Speed and rate from frame k to the next, and from there to the one after it, differ by drawn accelerations. A jump
+/// determines nothing, and behind it they begin again.
+void PathSmoother::add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
   const auto is_jump = [&](std::size_t i) { return i < problem_.is_jump.size() && problem_.is_jump[i]; };
   if (is_jump(k) || is_jump(k + 1)) system.chain.A.diagonal().head<6>().array() += hardly_given;
   if (is_jump(k + 1)) return;
-  WindowRows J = WindowRows::Zero();
   const Speeds first = speeds(state, k);
-  if (k == 0 || is_jump(k)) {
-    Eigen::Vector<double, 6> given = Eigen::Vector<double, 6>::Zero(), variance;
-    variance << Eigen::Vector3d::Constant(std::pow(problem_.sigma_speed_m_s, 2)),
-        Eigen::Vector3d::Constant(std::pow(problem_.sigma_rate_rad_s, 2));
-    if (problem_.start && k == 0) {
-      given << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
-      variance = problem_.start->cov.diagonal().tail<6>();
-    }
-    constexpr double any_m_s = 5.0;  // an IMU's path is in metres; what was supposed of its speed is not
-    if (problem_.imu) variance.head<3>().array() += any_m_s * any_m_s;
-    J.leftCols<6>() = first.J_from;
-    J.middleCols<6>(6) = first.J_to;
-    add_window(J, first.values - given, variance + walked_before(steps(k)) * step_variance, system);
-  }
+  if (k == 0 || is_jump(k)) add_first_speeds(first, k, system);
   if (k + 2 >= state.poses.size() || is_jump(k + 2)) return;
   const Speeds second = speeds(state, k + 1);
+  WindowRows J;
   J.leftCols<6>() = -first.J_from;
   J.middleCols<6>(6) = second.J_from - first.J_to;
   J.rightCols<6>() = second.J_to;
-  const double num_steps = walked_before(steps(k + 1)) + walked_after(steps(k));
+  const double num_drawn = walked_before(num_steps(k + 1)) + walked_after(num_steps(k));
   Eigen::Vector<double, 6> change = second.values - first.values;
   const auto is_measured = [&](Eigen::Index row) {
     J.middleRows<3>(row).setZero();
@@ -227,7 +238,7 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
   };
   if (uses_forces(k)) is_measured(0);
   if (uses_rates(k) && uses_rates(k + 1)) is_measured(3);
-  add_acceleration(surroundings(state, k, system.chain), J, change, num_steps * step_variance, system);
+  add_acceleration(surroundings(state, k, system.chain), J, change, num_drawn * step_variance(), system);
 }
 
 /// Where what is given is tested, with what the motion asks of each pose and point.

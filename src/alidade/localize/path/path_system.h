@@ -103,6 +103,9 @@ class PathSmoother {
   [[nodiscard]] Surroundings surroundings(const SmootherState& state, std::size_t k, const PoseChain& chain) const;
   void add_acceleration(const Surroundings& around, const WindowRows& J, Eigen::Vector<double, 6> error,
                         const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const;
+  [[nodiscard]] double num_steps(std::size_t k) const;
+  [[nodiscard]] Eigen::Vector<double, 6> step_variance() const;
+  void add_first_speeds(const Speeds& first, std::size_t k, SmootherSystem& system) const;
   void add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_motion_and_pull(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_start(const SmootherState& state, SmootherSystem& system) const;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 #include "alidade/rangefinder/checks/cause_checks.h"
@@ -169,12 +170,7 @@ void add_handedness(const RangefinderReport& report, Verdict& verdict) {
 }
 
 Verdict refusal(State state, ExitCode code, const std::string& sentence, const std::string& add) {
-  Verdict verdict;
-  verdict.state = state;
-  verdict.exit_code = code;
-  verdict.sentence = sentence;
-  verdict.to_add = add;
-  return verdict;
+  return {state, code, sentence, add, {}};
 }
 
 State graded(double value, double good, double refuse) {
@@ -307,72 +303,94 @@ Verdict refusal_by_status(const RangefinderReport& report, Method method, const 
                  "check the ranges' unit, that each spot and board belongs to its range, and the camera file");
 }
 
+const Check* find_check(std::span<const Check> checks, State state, std::string_view name = {}) {
+  const auto at = std::ranges::find_if(
+      checks, [&](const Check& check) { return check.state == state && (name.empty() || check.name == name); });
+  return at != checks.end() ? &*at : nullptr;
+}
+
+/// Of shots that were solved for, what a check says that refuses them for a cause of its own.
+std::optional<Verdict> refusal_by_check(const RangefinderReport& report, std::span<const Check> checks) {
+  if (const Check* const scale = find_check(checks, State::refused, "scale"))
+    return refusal(State::refused, ExitCode::undetermined, scale->text,
+                   "give the ranges in metres; a scale that is known to be so: --scale");
+  const Check* const noise = find_check(checks, State::refused, "range noise");
+  if (noise != nullptr && report.status == Status::converged)
+    return refusal(State::not_converged, ExitCode::no_convergence, noise->text,
+                   "check that each range belongs to its spot and board, that the beam hit the board, and the unit");
+  const Check* const first = find_check(checks, State::refused);
+  if (first != nullptr && first->name == "outliers")
+    return refusal(State::not_converged, ExitCode::no_convergence, "the shots do not agree: " + first->text,
+                   "check that the beam hit the board in each");
+  if (first != nullptr && first->name == "boards")
+    return refusal(State::refused, ExitCode::undetermined, first->text,
+                   "check --board, --square and the camera; --method spot does without boards");
+  return std::nullopt;
+}
+
+Verdict refusal_by_geometry(const RangefinderReport& report, std::span<const Shot> shots, Method method,
+                            std::vector<Check>& checks) {
+  const Weakness reason = reason_of(report, shots, method);
+  Verdict verdict =
+      refusal(State::refused, ExitCode::undetermined, reason.what, reason.add + other_method(method, supply_of(shots)));
+  for (const Check& check : checks)
+    if (check.state == State::care && (check.name == "columns" || check.name == "spots outside"))
+      verdict.to_add += "; " + check.text;
+  checks.push_back(check_of(reason.name, State::refused, reason.what, 0.0, 0.0, "", "next"));
+  return verdict;
+}
+
+/// A beam with its σ, and what to do about the check that is least content.
+Verdict verdict_of_beam(const RangefinderReport& report, std::span<const Check> checks) {
+  Verdict verdict;
+  if (const Check* const care = find_check(checks, State::care)) {
+    verdict.state = State::care;
+    verdict.to_add = care->text;
+    // What is wrong comes before what follows from it.
+    for (const std::string_view cause :
+         {"shots agree", "spots by distance", "bend", "drift", "wander", "scale", "fit", "outliers", "boards", "camera",
+          "distortion", "spots outside", "columns", "mirrored"})
+      for (const Check& check : checks)
+        if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
+  }
+  const Eigen::Vector3d mm = 1e3 * report.beam.origin_in_cam;
+  verdict.sentence = "origin (" + text_of(mm.x()) + ", " + text_of(mm.y()) + ", " + text_of(mm.z()) + ") mm ± " +
+                     text_of(3e3 * report.bound.sigma_origin_m, 2) + " mm, direction ± " +
+                     text_of(3e3 * report.bound.sigma_direction_rad, 2) + " mrad (3σ) from " +
+                     std::to_string(report.shots_used) + " shots";
+  return verdict;
+}
+
+std::vector<Check> checks_of(const RangefinderReport& report, std::span<const Shot> shots,
+                             const RangefinderConfig& config) {
+  Verdict verdict;
+  add_precision(report, config.method, verdict);
+  add_geometry(report, shots, config.method, verdict);
+  add_fit(report, verdict);
+  add_clusters(report, verdict);
+  if (config.method != Method::spot) add_boards(report, shots, verdict);
+  add_spare(report, verdict);
+  add_cause_checks(report, shots, config, verdict);
+  add_handedness(report, verdict);
+  return std::move(verdict.checks);
+}
+
 }  // namespace
 
 Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,
                             const RangefinderConfig& config) {
-  const Supply supply = supply_of(shots);
-  const Method method = config.method;
   const bool is_solved = report.status == Status::converged || report.status == Status::degenerate ||
                          report.status == Status::no_convergence || report.status == Status::ambiguous;
+  std::vector<Check> checks = is_solved ? checks_of(report, shots, config) : std::vector<Check>{};
   Verdict verdict;
-  if (is_solved) {
-    add_precision(report, method, verdict);
-    add_geometry(report, shots, method, verdict);
-    add_fit(report, verdict);
-    add_clusters(report, verdict);
-    if (method != Method::spot) add_boards(report, shots, verdict);
-    add_spare(report, verdict);
-    add_cause_checks(report, shots, config, verdict);
-    add_handedness(report, verdict);
-  }
-  const auto worst = [&](State state) {
-    return std::find_if(verdict.checks.begin(), verdict.checks.end(), [&](const Check& c) { return c.state == state; });
-  };
-  const auto refused = worst(State::refused);
-  std::vector<Check> checks = verdict.checks;
-  const auto named = [&](std::string_view name) {
-    return std::find_if(verdict.checks.begin(), verdict.checks.end(),
-                        [&](const Check& c) { return c.name == name && c.state == State::refused; });
-  };
-  if (is_solved && named("scale") != verdict.checks.end()) {
-    verdict = refusal(State::refused, ExitCode::undetermined, named("scale")->text,
-                      "give the ranges in metres; a scale that is known to be so: --scale");
-  } else if (is_solved && report.status == Status::converged && named("range noise") != verdict.checks.end()) {
-    verdict = refusal(State::not_converged, ExitCode::no_convergence, named("range noise")->text,
-                      "check that each range belongs to its spot and board, that the beam hit the board, and the unit");
-  } else if (is_solved && refused != verdict.checks.end() && refused->name == "outliers") {
-    verdict = refusal(State::not_converged, ExitCode::no_convergence, "the shots do not agree: " + refused->text,
-                      "check that the beam hit the board in each");
-  } else if (is_solved && refused != verdict.checks.end() && refused->name == "boards") {
-    verdict = refusal(State::refused, ExitCode::undetermined, refused->text,
-                      "check --board, --square and the camera; --method spot does without boards");
-  } else if (report.status == Status::degenerate || (is_solved && refused != verdict.checks.end())) {
-    const Weakness reason = reason_of(report, shots, method);
-    verdict = refusal(State::refused, ExitCode::undetermined, reason.what, reason.add + other_method(method, supply));
-    for (const Check& check : checks)
-      if (check.state == State::care && (check.name == "columns" || check.name == "spots outside"))
-        verdict.to_add += "; " + check.text;
-    checks.push_back(check_of(reason.name, State::refused, reason.what, 0.0, 0.0, "", "next"));
-  } else if (report.status != Status::converged) {
-    verdict = refusal_by_status(report, method, supply);
-  } else {
-    if (const auto care = worst(State::care); care != verdict.checks.end()) {
-      verdict.state = State::care;
-      verdict.to_add = care->text;
-      // What is wrong comes before what follows from it.
-      for (const std::string_view cause :
-           {"shots agree", "spots by distance", "bend", "drift", "wander", "scale", "fit", "outliers", "boards",
-            "camera", "distortion", "spots outside", "columns", "mirrored"})
-        for (const Check& check : verdict.checks)
-          if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
-    }
-    const Eigen::Vector3d mm = 1e3 * report.beam.origin_in_cam;
-    verdict.sentence = "origin (" + text_of(mm.x()) + ", " + text_of(mm.y()) + ", " + text_of(mm.z()) + ") mm ± " +
-                       text_of(3e3 * report.bound.sigma_origin_m, 2) + " mm, direction ± " +
-                       text_of(3e3 * report.bound.sigma_direction_rad, 2) + " mrad (3σ) from " +
-                       std::to_string(report.shots_used) + " shots";
-  }
+  if (auto refused = refusal_by_check(report, checks))
+    verdict = *std::move(refused);
+  else if (report.status == Status::degenerate || find_check(checks, State::refused) != nullptr)
+    verdict = refusal_by_geometry(report, shots, config.method, checks);
+  else if (report.status != Status::converged)
+    verdict = refusal_by_status(report, config.method, supply_of(shots));
+  else
+    verdict = verdict_of_beam(report, checks);
   verdict.checks = std::move(checks);
   return verdict;
 }

@@ -1,0 +1,88 @@
+#include <cmath>
+#include <string>
+
+#include "alidade/localize/checks/judge.h"
+#include "alidade/localize/path/path_doubt.h"
+
+// What is said of sensors beside the camera, and by them of the scale.
+
+namespace alidade {
+namespace {
+
+/// Readings that are not in metres, or of another clock.
+void add_readings(const SensorScale& sensor, Verdict& verdict) {
+  constexpr double fast = 5.0;
+  if (sensor.acceleration > fast)
+    verdict.checks.push_back({sensor.sensor + " unit", State::care,
+                              "by the " + sensor.sensor + " the camera accelerates " + text_of(sensor.acceleration, 2) +
+                                  " times as much as --sigma-a says: are its readings in metres?",
+                              sensor.acceleration, fast, "1", "path"});
+  if (sensor.late_s != 0.0)
+    verdict.checks.push_back({sensor.sensor + " clock", State::care,
+                              "the clock of the " + sensor.sensor + " is " + text_of(std::abs(sensor.late_s), 2) +
+                                  " s " + (sensor.late_s > 0.0 ? "after" : "before") + " the camera's: corrected",
+                              std::abs(sensor.late_s), 0.0, "s", "path"});
+}
+
+/// Why a sensor's readings do not determine the scale.
+std::string unread_text(const SensorScale& sensor, const Localization& report) {
+  if (sensor.sensor == "IMU") return imu_fault_text(*report.imu);
+  return "the readings of the " + sensor.sensor + " do not determine the scale: " +
+         (!sensor.is_in_time            ? "none of them is of the time of the path (t_s)"
+          : sensor.sensor == "odometry" ? "too few of them, or the camera hardly moves"
+          : sensor.sensor == "depth sensor"
+              ? "too few of them, or the camera moves too little up and down"
+              : "too few of them, or too few points around the beam that lie on a surface");
+}
+
+/// The path's scale by a sensor against that by the first of them, where that has given it, or by the target.
+void add_agreement(const SensorScale& sensor, const SensorScale* first, Verdict& verdict) {
+  constexpr double care_z = 3.0, bad_z = 6.0;
+  const double sigma = std::hypot(sensor.sigma_rel, first ? first->sigma_rel : 0.0);
+  const double change = std::log(sensor.scale / (first ? first->scale : 1.0)), z = std::abs(change) / sigma;
+  const std::string by = first ? "the " + first->sensor : "the target";
+  verdict.checks.push_back({sensor.sensor, state_of(z, care_z, bad_z),
+                            z > care_z ? "the path is " + text_of(100.0 * change, 2) + " % longer by the " +
+                                             sensor.sensor + " than by " + by + " (" + text_of(z, 2) + "σ)"
+                                       : "the " + sensor.sensor + " agrees with " + by + " on the scale",
+                            z, care_z, "σ", "path"});
+}
+
+void add_rejected(const SensorScale& sensor, Verdict& verdict) {
+  constexpr double many = 0.2;
+  const double rejected = share(sensor.num_rejected, sensor.num_used + sensor.num_rejected);
+  if (rejected > many)
+    verdict.checks.push_back(
+        {sensor.sensor + " readings", State::care,
+         text_of(100.0 * rejected, 2) + " % of the readings of the " + sensor.sensor + " are rejected", rejected, many,
+         "1", "path"});
+}
+
+}  // namespace
+
+std::string sensors_text(const Localization& report) {
+  std::string text;
+  double weights = 0.0;
+  for (const SensorScale& each : report.sensor_scales) {
+    if (!(each.sigma_rel > 0.0)) continue;
+    text += (text.empty() ? "" : " and the ") + each.sensor;
+    weights += 1.0 / (each.sigma_rel * each.sigma_rel);
+  }
+  return text + ", ± " + text_of(100.0 / std::sqrt(weights), 2) + " %";
+}
+
+void add_sensors(const Localization& report, Verdict& verdict) {
+  const SensorScale* first = nullptr;
+  for (const SensorScale& each : report.sensor_scales) {
+    if (!(each.sigma_rel > 0.0)) {
+      verdict.checks.push_back({each.sensor, State::care, unread_text(each, report), 0.0, 0.0, "", "path"});
+      continue;
+    }
+    add_readings(each, verdict);
+    if (!report.is_scale_read || first) add_agreement(each, report.is_scale_read ? first : nullptr, verdict);
+    add_rejected(each, verdict);
+    if (first == nullptr) first = &each;
+  }
+}
+
+}  // namespace alidade

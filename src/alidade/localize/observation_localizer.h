@@ -62,7 +62,7 @@ class ObservationLocalizer {
   void heed_doubt(const ObservationFrame& frame, std::optional<OtherPlace> other, Doubt doubt,
                   const ObservationsReport& report, PathStep& step);
 
-  [[nodiscard]] Recording recording() const;
+  [[nodiscard]] Recording recording(const KeptFrames& frames) const;
 
   LocalizeEngine engine_;
   const LocalizeConfig& config_;

@@ -54,6 +54,15 @@ std::vector<PathStep> KeptFrames::steps(std::span<const PathStep> path) const {
   return kept;
 }
 
+KeptFrames KeptFrames::averaged(std::vector<ObservationFrame> means, std::size_t num_each) const {
+  KeptFrames still(max_);
+  still.stride_ = stride_ * num_each;
+  still.num_given_ = num_given_;
+  still.frames_ = std::move(means);
+  still.is_still_ = true;
+  return still;
+}
+
 void KeptFrames::put_back(std::span<const PathStep> solved, std::vector<PathStep>& path) const {
   const std::vector<PathStep> followed = path;
   const auto moved = [&](std::size_t kept, std::size_t to) {  // as the filter went from a kept frame
@@ -69,6 +78,12 @@ void KeptFrames::put_back(std::span<const PathStep> solved, std::vector<PathStep
       continue;
     }
     if (!path[k].has_pose()) continue;
+    if (is_still_) {
+      const PathStep &before = solved[a], &after = solved[std::min(b, solved.size() - 1)];
+      const double share = (path[k].t_s - before.t_s) / std::max(after.t_s - before.t_s, path[k].t_s - before.t_s);
+      put_between(before.has_pose() ? before : after, after, share, path[k]);
+      continue;
+    }
     const bool from_a = is_followed(followed, at_a, k), from_b = at_b < path.size() && is_followed(followed, k, at_b);
     if (from_a && from_b) {
       put_between(moved(a, k), moved(b, k), (path[k].t_s - path[at_a].t_s) / (path[at_b].t_s - path[at_a].t_s),

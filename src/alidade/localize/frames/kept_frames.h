@@ -26,9 +26,13 @@ class KeptFrames {
   /// The poses of `path`, which the filter followed, where those kept are `solved`: between two of them as the filter
   /// went, with what that is off at the second one shared out over the time between.
   void put_back(std::span<const PathStep> solved, std::vector<PathStep>& path) const;
+  /// Means over stretches of `num_each` of these frames, of a camera that stands still: between two of them it is where
+  /// they say, and not where a filter went.
+  [[nodiscard]] KeptFrames averaged(std::vector<ObservationFrame> means, std::size_t num_each) const;
 
  private:
   std::size_t max_, stride_ = 1, num_given_ = 0;
+  bool is_still_ = false;
   std::vector<ObservationFrame> frames_;
 };
 

@@ -170,6 +170,52 @@ Camera nearest_of_kind(const Camera& given, const Camera& other, std::span<const
   return camera;
 }
 
+/// Which of a frame's points are to be seen as well: of those that are seen longest from there on, from near the centre
+/// of the image to its edge, by which kinds of lens differ.
+std::vector<long> points_to_add(const ObservationFrame& frame, const Eigen::Vector2d& centre_px, std::size_t num,
+                                const std::map<long, std::size_t>& num_left, const std::set<long>& chosen) {
+  std::vector<std::pair<double, long>> by_radius;
+  std::size_t most = 0;
+  for (const FeatureObservation& each : frame.observations)
+    if (!chosen.contains(each.id)) most = std::max(most, num_left.at(each.id));
+  for (const FeatureObservation& each : frame.observations)
+    if (!chosen.contains(each.id) && 2 * num_left.at(each.id) >= most)
+      by_radius.emplace_back((each.px - centre_px).norm(), each.id);
+  std::ranges::sort(by_radius);
+  num = std::min(num, by_radius.size());
+  std::vector<long> added;
+  for (std::size_t i = 0; i < num; ++i) added.push_back(by_radius[i * by_radius.size() / num].second);
+  return added;
+}
+
+/// The frames with the target's and at any time so many other points: a filter's work grows with the square of their
+/// number and more.
+std::vector<ObservationFrame> with_fewer_points(std::span<const ObservationFrame> frames,
+                                                std::span<const KnownPoint> target, const Camera& camera) {
+  // Without a target from 30 on none is tried with another speed (ObservationLocalizer::start).
+  const std::size_t enough = target.empty() ? 40 : 20, few = target.empty() ? 30 : 15;
+  const Eigen::Vector2d centre_px = params(camera.lens).segment<2>(2);
+  std::map<long, std::size_t> num_left;
+  for (const ObservationFrame& frame : frames)
+    for (const FeatureObservation& each : frame.observations) ++num_left[each.id];
+  std::set<long> known, chosen;
+  for (const KnownPoint& point : target) known.insert(point.id);
+  chosen = known;
+  std::vector<ObservationFrame> out(frames.begin(), frames.end());
+  for (const ObservationFrame& frame : out) {
+    const auto num =
+        static_cast<std::size_t>(std::ranges::count_if(frame.observations, [&](const FeatureObservation& each) {
+          return chosen.contains(each.id) && !known.contains(each.id);
+        }));
+    if (num < few)
+      for (const long id : points_to_add(frame, centre_px, enough - num, num_left, chosen)) chosen.insert(id);
+    for (const FeatureObservation& each : frame.observations) --num_left[each.id];
+  }
+  for (ObservationFrame& frame : out)
+    std::erase_if(frame.observations, [&](const FeatureObservation& each) { return !chosen.contains(each.id); });
+  return out;
+}
+
 /// Whether what a verdict is not content with may be due to the lens.
 bool may_be_of_lens(const Verdict& verdict) {
   if (verdict.state == State::not_converged || verdict.state == State::refused) return true;
@@ -243,9 +289,11 @@ std::optional<OtherLensKind> other_lens_kind(std::span<const ObservationFrame> f
     if (leaves_no_trace(result, explained) || (result.is_smoothed && has_many_mismatches(explained)))
       return std::nullopt;
   }
-  frames = frames.first(std::min(frames.size(), most));
   const Camera& as_given = result.given_camera ? *result.given_camera : result.camera;
   const Camera given = without_cov(as_given, as_given.lens);
+  const std::vector<ObservationFrame> fewer =
+      with_fewer_points(frames.first(std::min(frames.size(), most)), target, given);
+  frames = fewer;
   const auto solved = [&](const Camera& camera) { return solved_with(camera, frames, target, config); };
   const auto is_better = [](const Explained& a, const Explained& b) {
     return a.cost < far_better * b.cost && a.cost + least_gain < b.cost;

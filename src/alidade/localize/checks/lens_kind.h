@@ -16,9 +16,10 @@ struct OtherLensKind {
 };
 
 /// Where what `result.verdict` is not content with may be due to the lens, the path is solved again from at most 300
-/// frames for each kind of lens, which is estimated; not where the path is of all that was seen and leaves residuals
-/// that do not depend on the position in the image, nor where a fifth of the observations are mismatches, so that no
-/// kind explains enough. `frames`: as seen, or as matched in images; `target`: by the numbers there.
+/// frames of the target and some twenty other points at a time for each kind of lens, which is estimated; not where the
+/// path is of all that was seen and leaves residuals that do not depend on the position in the image, nor where a fifth
+/// of the observations are mismatches, so that no kind explains enough. `frames`: as seen, or as matched in images;
+/// `target`: by the numbers there.
 [[nodiscard]] std::optional<OtherLensKind> other_lens_kind(std::span<const ObservationFrame> frames,
                                                            std::span<const KnownPoint> target,
                                                            const LocalizeConfig& config, const Localization& result);

@@ -44,8 +44,11 @@ bool ObservationLocalizer::start(const ObservationFrame& frame) {
   return true;
 }
 
-/// Of many known points, as of a map, those that are seen; for them those leave that were not seen for longest.
+/// Of many known points, as of a map, those that are seen; for them those leave that were not seen for longest. What
+/// was given of a point is news once: each time that it comes back it is given with twice the σ, so that all of them
+/// together say at most 1 + 1/4 + 1/16 + … = 4/3 of it.
 void ObservationLocalizer::enter_known(const ObservationFrame& frame) {
+  constexpr double again = 2.0;
   if (known_.empty()) return;
   std::vector<std::pair<std::size_t, long>> unseen;
   for (const Feature& feature : engine_.best().features())
@@ -64,6 +67,7 @@ void ObservationLocalizer::enter_known(const ObservationFrame& frame) {
     }
     engine_.filters().add_known(known->first, known->second.point_in_world, known->second.sigma_m);
     if (!engine_.best().has(known->first)) return;  // no room
+    known->second.sigma_m *= again;
     points_.entered(known->first, num_taken_);
     ++num;
   }

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <mutex>
 #include <opencv2/core.hpp>
@@ -10,6 +9,7 @@
 #include "alidade/files/files.h"
 #include "alidade/heads/streams/arrival_times.h"
 #include "alidade/heads/streams/frame_stream.h"
+#include "alidade/heads/streams/waiting_frames.h"
 #include "alidade/images/video_process.h"
 
 namespace alidade {
@@ -36,11 +36,7 @@ class DecodedStream final : public FrameStream {
   DecodedStream& operator=(const DecodedStream&) = delete;
 
   [[nodiscard]] const std::string& name() const override { return name_; }
-  [[nodiscard]] std::deque<StreamFrame> take() override {
-    const std::scoped_lock lock(mutex_);
-    if (!fault_.empty() && frames_.empty()) throw InputError(fault_);
-    return std::exchange(frames_, {});
-  }
+  [[nodiscard]] std::deque<StreamFrame> take() override { return frames_.take(); }
 
  private:
   void begin() {
@@ -64,42 +60,28 @@ class DecodedStream final : public FrameStream {
   }
 
   void read() {
-    constexpr std::size_t max_waiting = 200;
     while (!ends_) {
       std::string fault = "has ended";
       try {
         std::vector<unsigned char> bytes = video_->next();
         const double now_s = clock_->now_s();
         if (!bytes.empty()) {
-          StreamFrame frame = frame_of(std::move(bytes), now_s);
-          const std::scoped_lock lock(mutex_);
-          frames_.push_back(std::move(frame));
-          if (frames_.size() > max_waiting) frames_.pop_front();
+          frames_.add(frame_of(std::move(bytes), now_s));
           continue;
         }
       } catch (const InputError&) {
         fault = "broke off";
       }
       if (connects_again()) continue;
-      const std::scoped_lock lock(mutex_);
-      fault_ = name_ + ": " + fault + "; the stream is lost";
-      return;
+      return frames_.end(name_ + ": " + fault + "; the stream is lost");
     }
   }
 
-  /// With growing pauses.
   bool connects_again() {
-    constexpr int tries = 5, first_pause_ms = 200;
-    for (int i = 0; i < tries && !ends_; ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(first_pause_ms << i));
-      try {
-        arrivals_ = {};
-        if (!ends_) begin();
-        return true;
-      } catch (const InputError&) {  // not yet
-      }
-    }
-    return false;
+    return begins_again(ends_, [this] {
+      arrivals_ = {};
+      if (!ends_) begin();
+    });
   }
 
   std::string name_;
@@ -108,8 +90,7 @@ class DecodedStream final : public FrameStream {
   std::mutex mutex_;
   std::unique_ptr<VideoProcess> video_;
   ArrivalTimes arrivals_;
-  std::deque<StreamFrame> frames_;
-  std::string fault_;
+  WaitingFrames frames_{200};
   std::atomic<bool> ends_ = false;
   std::thread reader_;
 };

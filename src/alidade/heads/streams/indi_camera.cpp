@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
-#include <mutex>
 #include <opencv2/core.hpp>
 #include <thread>
 
@@ -12,6 +11,7 @@
 #include "alidade/heads/protocols/soap.h"
 #include "alidade/heads/streams/fits_image.h"
 #include "alidade/heads/streams/frame_stream.h"
+#include "alidade/heads/streams/waiting_frames.h"
 
 namespace alidade {
 namespace {
@@ -49,11 +49,7 @@ class IndiCamera final : public FrameStream {
 
   [[nodiscard]] const std::string& name() const override { return link_.name(); }
   [[nodiscard]] double exposure_s() const override { return seconds_; }
-  [[nodiscard]] std::deque<StreamFrame> take() override {
-    const std::scoped_lock lock(mutex_);
-    if (!fault_.empty() && frames_.empty()) throw InputError(fault_);
-    return std::exchange(frames_, {});
-  }
+  [[nodiscard]] std::deque<StreamFrame> take() override { return frames_.take(); }
 
  private:
   static constexpr const char* exposure = "CCD_EXPOSURE";
@@ -71,19 +67,14 @@ class IndiCamera final : public FrameStream {
   }
 
   void read() {
-    constexpr std::size_t max_waiting = 20;
     while (!ends_) {
       try {
         std::optional<StreamFrame> frame = expose();
         if (!frame) return;
-        const std::scoped_lock lock(mutex_);
-        frames_.push_back(std::move(*frame));
-        if (frames_.size() > max_waiting) frames_.pop_front();
+        frames_.add(*std::move(frame));
       } catch (const InputError& error) {
         if (connects_again()) continue;
-        const std::scoped_lock lock(mutex_);
-        fault_ = std::string(error.what()) + "; the stream is lost";
-        return;
+        return frames_.end(std::string(error.what()) + "; the stream is lost");
       }
     }
   }
@@ -124,27 +115,17 @@ class IndiCamera final : public FrameStream {
     return {blob.t_s - 0.5 * exposed_s, FrameTimes::arrival, 0.1, blob.t_s, std::move(grey)};
   }
 
-  /// With growing pauses.
   bool connects_again() {
-    constexpr int tries = 5, first_pause_ms = 200;
-    for (int i = 0; i < tries && !ends_; ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(first_pause_ms << i));
-      try {
-        link_.connect_again();
-        begin();
-        return true;
-      } catch (const InputError&) {  // not yet
-      }
-    }
-    return false;
+    return begins_again(ends_, [this] {
+      link_.connect_again();
+      begin();
+    });
   }
 
   double seconds_;
   std::shared_ptr<HeadClock> clock_;
   IndiLink link_;
-  std::mutex mutex_;
-  std::deque<StreamFrame> frames_;
-  std::string fault_;
+  WaitingFrames frames_{20};
   std::atomic<bool> ends_ = false;
   std::thread reader_;
 };

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <mutex>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <thread>
@@ -15,6 +13,7 @@
 #include "alidade/heads/protocols/soap.h"
 #include "alidade/heads/streams/arrival_times.h"
 #include "alidade/heads/streams/frame_stream.h"
+#include "alidade/heads/streams/waiting_frames.h"
 #include "alidade/imaging/image_codecs.h"
 
 namespace alidade {
@@ -36,8 +35,7 @@ class MjpegStream final : public FrameStream {
         clock_(std::move(clock)),
         socket_(address_of(url, "http://", 80), first_timeout_s) {
     begin();
-    const StreamFrame first = next();
-    frames_.push_back(first);
+    frames_.add(next());
     reader_ = std::thread([this] { read(); });
   }
   ~MjpegStream() override {
@@ -48,11 +46,7 @@ class MjpegStream final : public FrameStream {
   MjpegStream& operator=(const MjpegStream&) = delete;
 
   [[nodiscard]] const std::string& name() const override { return name_; }
-  [[nodiscard]] std::deque<StreamFrame> take() override {
-    const std::scoped_lock lock(mutex_);
-    if (!fault_.empty() && frames_.empty()) throw InputError(fault_);
-    return std::exchange(frames_, {});
-  }
+  [[nodiscard]] std::deque<StreamFrame> take() override { return frames_.take(); }
 
  private:
   void begin() {
@@ -103,46 +97,30 @@ class MjpegStream final : public FrameStream {
 
   void read() {
     constexpr double silence_s = 1.0;
-    constexpr std::size_t max_waiting = 200;
     socket_.set_timeout(silence_s);
     while (!ends_) {
       try {
-        StreamFrame frame = next();
-        const std::scoped_lock lock(mutex_);
-        frames_.push_back(std::move(frame));
-        if (frames_.size() > max_waiting) frames_.pop_front();
+        frames_.add(next());
       } catch (const InputError& error) {
         if (connects_again()) continue;
-        const std::scoped_lock lock(mutex_);
-        fault_ = std::string(error.what()) + "; the stream is lost";
-        return;
+        return frames_.end(std::string(error.what()) + "; the stream is lost");
       }
     }
   }
 
-  /// With growing pauses.
   bool connects_again() {
-    constexpr int tries = 5, first_pause_ms = 200;
-    for (int i = 0; i < tries && !ends_; ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(first_pause_ms << i));
-      try {
-        socket_.close();
-        arrivals_ = {};
-        begin();
-        return true;
-      } catch (const InputError&) {  // not yet
-      }
-    }
-    return false;
+    return begins_again(ends_, [this] {
+      socket_.close();
+      arrivals_ = {};
+      begin();
+    });
   }
 
   std::string name_, password_;
   std::shared_ptr<HeadClock> clock_;
   LineSocket socket_;
   ArrivalTimes arrivals_;
-  std::mutex mutex_;
-  std::deque<StreamFrame> frames_;
-  std::string fault_;
+  WaitingFrames frames_{200};
   std::atomic<bool> ends_ = false;
   std::thread reader_;
 };

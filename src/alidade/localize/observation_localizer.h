@@ -63,6 +63,13 @@ class ObservationLocalizer {
                   const ObservationsReport& report, PathStep& step);
 
   [[nodiscard]] Recording recording(const KeptFrames& frames) const;
+  /// A path, and what it was solved from, where that is not all that was seen.
+  struct Solution {
+    WholePath whole;
+    std::optional<KeptFrames> few;
+    bool is_of_known = false;  ///< Known points alone.
+  };
+  [[nodiscard]] std::optional<Solution> solved(Localization& result) const;
 
   LocalizeEngine engine_;
   const LocalizeConfig& config_;

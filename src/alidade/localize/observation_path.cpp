@@ -13,22 +13,47 @@ Recording ObservationLocalizer::recording(const KeptFrames& frames) const {
   return recording;
 }
 
+/// From one place what seems a parallax grows with the number of poses (frames/still_frames.h): where the camera hardly
+/// translates, some fifty frames are solved for, if need be of known points alone. An IMU's readings are of all frames.
+std::optional<ObservationLocalizer::Solution> ObservationLocalizer::solved(Localization& result) const {
+  constexpr std::size_t enough = 50;
+  const std::span<const KnownPoint> known = config_.target.points;
+  const auto of_few = [&](std::optional<KeptFrames> few, bool is_of_known) -> std::optional<Solution> {
+    auto whole = few ? whole_path(recording(*few), engine_, config_, result) : std::nullopt;
+    if (!whole) return std::nullopt;
+    return Solution{std::move(*whole), std::move(few), is_of_known};
+  };
+  const bool may_be_few = !known.empty() && !config_.imu;
+  if (may_be_few)
+    if (auto still = of_few(averaged_still(frames_, known, result.sigma_px), true)) return still;
+  const Localization before = result;
+  auto all = whole_path(recording(frames_), engine_, config_, result);
+  const std::size_t num_each = frames_.frames().size() / enough;
+  if (may_be_few && num_each > 1 && (!all || all->smoothed.is_from_one_place)) {
+    const Localization of_all = result;
+    for (const bool is_of_known : {false, true}) {
+      result = before;
+      auto few = of_few(frames_.every(num_each, is_of_known ? known : std::span<const KnownPoint>()), is_of_known);
+      if (few && few->whole.smoothed.is_from_one_place) return few;
+    }
+    result = of_all;
+  }
+  if (!all) return std::nullopt;
+  return Solution{std::move(*all), {}, false};
+}
+
 void ObservationLocalizer::sum_up(Localization& result) const {
   const LocalizeTarget& target = config_.target;
   result.sigma_px = config_.filter.sigma_px;
   result.is_board = target.board.has_value();
-  // An IMU's readings are of all frames; without a target nothing is seen of a still camera's depths.
-  std::optional<KeptFrames> still;
-  if (config_.smooths && !config_.imu && !target.points.empty())
-    still = averaged_still(frames_, target.points, result.sigma_px);
-  std::optional<WholePath> whole;
-  if (still) whole = whole_path(recording(*still), engine_, config_, result);
-  const Recording kept = recording(whole ? *still : frames_);
-  if (config_.smooths && !whole) whole = whole_path(kept, engine_, config_, result);
+  std::optional<Solution> solution;
+  if (config_.smooths) solution = solved(result);
+  const Recording kept = recording(solution && solution->few ? *solution->few : frames_);
+  const std::optional<WholePath> whole = solution ? std::optional(std::move(solution->whole)) : std::nullopt;
   engine_.sum_up(kept.num_used, result);
   result.num_left = num_left_;
   take_over(whole, kept, engine_, config_, result);
-  if (whole && still)  // what a filter says of other points' depths from one place is what noise seems to move it by
+  if (solution && solution->is_of_known)  // from one place what a filter says of other points' depths is noise
     std::erase_if(result.map, [](const MapPoint& point) { return !point.is_known; });
   join_episodes(episodes_, whole ? std::span<const long>(whole->smoothed.ids) : std::span<const long>(), result.map);
   result.known_shift = known_shift(result.map, target.points);

@@ -63,6 +63,20 @@ KeptFrames KeptFrames::averaged(std::vector<ObservationFrame> means, std::size_t
   return still;
 }
 
+KeptFrames KeptFrames::every(std::size_t num, std::span<const KnownPoint> alone) const {
+  std::vector<ObservationFrame> some;
+  for (std::size_t k = 0; k < frames_.size(); k += num) {
+    some.push_back(frames_[k]);
+    if (alone.empty()) continue;
+    std::erase_if(some.back().observations, [&](const FeatureObservation& each) {
+      return std::ranges::find(alone, each.id, &KnownPoint::id) == alone.end();
+    });
+  }
+  KeptFrames few = averaged(std::move(some), num);
+  few.is_still_ = false;
+  return few;
+}
+
 void KeptFrames::put_back(std::span<const PathStep> solved, std::vector<PathStep>& path) const {
   const std::vector<PathStep> followed = path;
   const auto moved = [&](std::size_t kept, std::size_t to) {  // as the filter went from a kept frame

@@ -6,6 +6,7 @@
 
 #include "alidade/localize/localization.h"
 #include "alidade/localize/sequence.h"
+#include "alidade/localize/target.h"
 
 namespace alidade {
 
@@ -29,6 +30,8 @@ class KeptFrames {
   /// Means over stretches of `num_each` of these frames, of a camera that stands still: between two of them it is where
   /// they say, and not where a filter went.
   [[nodiscard]] KeptFrames averaged(std::vector<ObservationFrame> means, std::size_t num_each) const;
+  /// One of so many of these; with the observations of known points alone where some are given.
+  [[nodiscard]] KeptFrames every(std::size_t num, std::span<const KnownPoint> alone) const;
 
  private:
   std::size_t max_, stride_ = 1, num_given_ = 0;

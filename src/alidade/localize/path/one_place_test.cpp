@@ -98,25 +98,25 @@ TEST(OnePlace, AStillCameraIndicatesNoOtherLens) {
 /// Solved by a pose of its own for each frame, 1500 frames like these came to no end, or 7 σ away: what noise seems to
 /// move the camera by outweighed all that is given. The errors of all frames are one, that of the target's given
 /// points.
-TEST(OnePlace, AStillCameraIsSolvedHoweverLong) {
+TEST(OnePlace, ACameraAtOnePlaceIsSolvedHoweverLong) {
   double nees = 0.0;
   const int draws = testing::trials(2);
   for (int draw = 0; draw < draws; ++draw) {
-    for (const int others : {0, 30}) {
-      const testing::Hover scene{.num_frames = 1500, .num_others = others, .sway = 0.0, .turn = 0.0};
+    for (const auto& [others, turn] : {std::pair{0, 0.0}, {30, 0.0}, {0, 1.0}, {30, 1.0}}) {
+      const testing::Hover scene{.num_frames = 1500, .num_others = others, .sway = 0.0, .turn = turn};
       const Outcome outcome = outcome_of(scene, draw);
       const Localization& result = outcome.result;
-      ASSERT_TRUE(result.is_smoothed) << others << ", " << draw << ": " << result.verdict.sentence;
+      ASSERT_TRUE(result.is_smoothed) << others << ", " << turn << ", " << draw << ": " << result.verdict.sentence;
       EXPECT_EQ(result.verdict.state, State::care) << result.verdict.sentence;
       EXPECT_TRUE(result.verdict.sentence.find("hardly translates") != std::string::npos) << result.verdict.sentence;
       EXPECT_FALSE(result.given_camera) << result.verdict.sentence;
-      EXPECT_LT(outcome.sigmas, 5.0) << others << ", " << draw;
-      EXPECT_TRUE(std::ranges::all_of(result.map, &MapPoint::is_known)) << "a depth from one place";
+      EXPECT_LT(outcome.sigmas, 5.0) << others << ", " << turn << ", " << draw;
+      if (turn == 0.0) EXPECT_TRUE(std::ranges::all_of(result.map, &MapPoint::is_known)) << "a depth from one place";
       const testing::HoverRun run = testing::hovering(scene, static_cast<std::uint64_t>(100 + draw));
-      nees += testing::pose_nees(result.path[700], run.truth[700].world_from_cam) / (2.0 * draws);
+      nees += testing::pose_nees(result.path[700], run.truth[700].world_from_cam) / (4.0 * draws);
     }
   }
-  EXPECT_LT(nees, 2.2);  // χ² of 24 numbers over their count: 99.9 % is 2.13
+  EXPECT_LT(nees, 2.75);  // of two targets: 99.9 % of χ² of twelve numbers over their count
 }
 
 INSTANTIATE_TEST_SUITE_P(Lenses, OnePlaceOf,

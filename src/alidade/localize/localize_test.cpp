@@ -286,6 +286,21 @@ TEST(Localize, APinholeInPlaceOfADistortingLensIsNeverGood) {
   }
 }
 
+/// A filter whose first map was off leaves residuals that the path of all frames, which is given, has not.
+TEST(Localize, ResidualsOfTheGivenPathTellOfTheLens) {
+  UnderwaterScene scene;
+  scene.camera = underwater_camera();
+  scene.num_points = 20;
+  scene.num_frames = 90;
+  scene.dt_s = 1.0 / 30.0;
+  for (const std::uint64_t seed : {110u, 207u}) {  // two of 48 whose filter was
+    UnderwaterSample sample = testing::underwater_sample(scene, seed);
+    sample.config.start.reset();
+    const Verdict verdict = localize(sample.frames, sample.camera, sample.config).verdict;
+    EXPECT_EQ(verdict.state, State::good) << seed << ": " << verdict.sentence;
+  }
+}
+
 /// A port of 5 cm, rotated by 2°, before a lens without distortion.
 Camera camera_behind_port() {
   Params<FlatPort> p;

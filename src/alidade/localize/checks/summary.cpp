@@ -86,7 +86,7 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
   result.is_smoothed = true;
   result.given = smoothed.given;
   const bool is_other_path = result.num_restarts > 0 || (smoothed.is_lens_freed && !result.is_of_images);
-  if (result.is_of_images || is_other_path) result.radial = smoothed.radial;
+  result.radial = smoothed.radial;
   if (result.is_of_images) {
     std::erase_if(result.given,
                   is_of_targets_points);  // patches of four corners change as they are seen from elsewhere

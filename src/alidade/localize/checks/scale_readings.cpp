@@ -21,6 +21,24 @@ std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s) {
   return Rigid3{a.rotation.slerp(share, b.rotation), (1.0 - share) * a.translation + share * b.translation};
 }
 
+Eigen::Matrix3d position_cov_at(std::span<const PathStep> path, double t_s) {
+  const auto after = std::ranges::lower_bound(path, t_s, {}, &PathStep::t_s);
+  if (after == path.end() || !after->has_pose()) return Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d R = after->world_from_cam.rotation.toRotationMatrix();
+  return R * after->cov.topLeftCorner<3, 3>() * R.transpose();
+}
+
+double persistent_square(std::span<const Eigen::Vector3d> left) {
+  if (left.size() < 3) return 0.0;
+  double squares = 0.0, steps = 0.0;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    squares += left[i].squaredNorm();
+    if (i > 0) steps += 0.5 * (left[i] - left[i - 1]).squaredNorm();
+  }
+  const double num = static_cast<double>(left.size());
+  return std::max(0.0, squares / num - steps / (num - 1.0));
+}
+
 namespace {
 
 constexpr double rejected_beyond = 4.0;  // of their robust σ
@@ -123,12 +141,78 @@ double clock_of(std::span<const DepthReading> readings, std::span<const PathStep
   return step_s * (static_cast<double>(best) - most + std::clamp(share, -1.0, 1.0));
 }
 
+/// What a sensor whose filter has a time constant is shown of a path; nothing before it has forgotten its first value.
+std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s) {
+  constexpr double forgotten = 3.0;  // time constants
+  std::vector<PathStep> steps(path.begin(), path.end());
+  const PathStep* last = nullptr;
+  double since_s = 0.0;
+  for (PathStep& step : steps) {
+    if (!step.has_pose()) {
+      last = nullptr;
+      continue;
+    }
+    if (last == nullptr) {
+      since_s = step.t_s;
+    } else {
+      // Between two frames the path is straight.
+      const PathStep& now = path[static_cast<std::size_t>(&step - steps.data())];
+      const PathStep& before = path[static_cast<std::size_t>(last - steps.data())];
+      const double gap_s = step.t_s - last->t_s, kept = std::exp(-gap_s / tau_s);
+      const Eigen::Vector3d speed = (now.world_from_cam.translation - before.world_from_cam.translation) / gap_s;
+      const Eigen::Vector3d behind = last->world_from_cam.translation - before.world_from_cam.translation;
+      step.world_from_cam.translation = now.world_from_cam.translation + kept * behind - (1.0 - kept) * tau_s * speed;
+    }
+    last = &step;
+  }
+  for (PathStep& step : steps)
+    if (step.t_s < since_s + forgotten * tau_s) step.event = FrameEvent::waiting;
+  return steps;
+}
+
+/// Time constant and clock of a sensor.
+struct Follows {
+  double tau_s = 0.0, late_s = 0.0, misfit = std::numeric_limits<double>::infinity();
+  double rival_tau_s = 0.0, rival_late_s = 0.0;  ///< A filter that is half believed.
+};
+
+/// A filter delays what it is shown by its time constant, as a late clock does, and makes it smaller, as no clock does:
+/// that with the least misfit, if it explains clearly more than the clock alone. Nothing is looked for where the clock
+/// is right and neighbours err by themselves.
+Follows follows(std::span<const DepthReading> readings, double late_s, std::span<const PathStep> path) {
+  constexpr double first_s = 0.05, last_s = 2.0, ratio = 1.1, step_s = 0.05, clear = 12.0, half_clear = 4.0,
+                   alike = 3.0;
+  constexpr int most = 2;  // beside a filter, the clock is right
+  std::vector<DepthRow> rows = rows_at(readings, late_s, path);
+  Follows best{.late_s = late_s, .misfit = misfit_of(rows)};
+  const Follows clock = best;
+  if (!fitted_without_far(rows) || (late_s == 0.0 && inflation(rows) < alike)) return clock;
+  for (double tau_s = first_s; tau_s < last_s; tau_s *= ratio) {
+    const std::vector<PathStep> shown = filtered(path, tau_s);
+    for (int k = -most; k <= most; ++k) {
+      const double late = k * step_s;
+      const double misfit = misfit_of(rows_at(readings, late, shown));
+      if (misfit < best.misfit) best = {.tau_s = tau_s, .late_s = late, .misfit = misfit};
+    }
+  }
+  if (best.tau_s == 0.0) return clock;
+  std::vector<DepthRow> explained = rows_at(readings, best.late_s, filtered(path, best.tau_s));
+  if (!fitted_without_far(explained)) return clock;
+  const double unit = best.misfit * inflation(explained) / static_cast<double>(explained.size());
+  const double gain = (clock.misfit - best.misfit) / unit;
+  if (gain > clear) return best;
+  Follows doubtful = clock;
+  if (gain > half_clear) doubtful.rival_tau_s = best.tau_s, doubtful.rival_late_s = best.late_s;
+  return doubtful;
+}
+
 }  // namespace
 
 std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
                                         std::span<const PathStep> path) {
-  const double late_s = clock_of(readings, path);
-  std::vector<DepthRow> rows = rows_at(readings, late_s, path);
+  const Follows found = follows(readings, clock_of(readings, path), path);
+  std::vector<DepthRow> rows = rows_at(
+      readings, found.late_s, found.tau_s > 0.0 ? filtered(path, found.tau_s) : std::vector(path.begin(), path.end()));
   const std::size_t num_given = rows.size();
   const auto fit = fitted_without_far(rows);
   if (!fit) return std::nullopt;
@@ -137,135 +221,21 @@ std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, 
   for (const DepthRow& row : rows) squares += row.left * row.left;
   const double worse = std::max(1.0, squares / (static_cast<double>(rows.size()) - 4.0)) * inflation(rows);
   const Eigen::Matrix3d cov = worse * fit->cov.topLeftCorner<3, 3>();
-  ReadScale read{g.norm(), 1.0, rows.size(), num_given - rows.size(), late_s};
+  ReadScale read{g.norm(), 1.0, rows.size(), num_given - rows.size(), found.late_s, 0.0, found.tau_s};
   if (!(read.scale > 0.0)) return std::nullopt;
   const Eigen::Vector3d along = g / read.scale;
   const double variance = along.dot(cov * along), across = cov.trace() - variance;
   // |g| grows by what is not known across it.
   read.sigma_rel = std::hypot(std::sqrt(variance) / read.scale, 0.5 * across / (read.scale * read.scale), sigma_rel);
+  if (found.rival_tau_s > 0.0) {
+    std::vector<DepthRow> others = rows_at(readings, found.rival_late_s, filtered(path, found.rival_tau_s));
+    const auto other = fitted_without_far(others);
+    if (other) read.sigma_rel = std::hypot(read.sigma_rel, std::log(other->values.head<3>().norm() / read.scale));
+  }
   constexpr double useless = 0.2, misfit = 0.5;
   if (!(read.sigma_rel < useless) || static_cast<double>(rows.size()) < misfit * static_cast<double>(num_given))
     return std::nullopt;
   return read;
-}
-
-namespace {
-
-struct NearPoint {
-  double off = 0.0;  ///< From the beam, over the depth.
-  Eigen::Vector3d point_in_world;
-};
-
-struct BeamScale {
-  double log_scale = 0.0, roughness = 0.0;  ///< The points off their plane, over the distance.
-};
-
-/// Metres a unit where the beam hits the plane through the points that are nearest to it. None: too few around it.
-std::optional<BeamScale> scale_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
-                                  std::span<const MapPoint> map) {
-  constexpr std::size_t num_near = 6;
-  constexpr double far_off = 0.25, max_roughness = 0.1;
-  const Eigen::Vector3d hit_in_cam = point_at(beam, range_m);
-  const Eigen::Vector3d direction = hit_in_cam.normalized();  // the camera's centre alone has no scale
-  const Rigid3 cam_from_world = world_from_cam.inverse();
-  std::vector<NearPoint> near;
-  for (const MapPoint& point : map) {
-    const Eigen::Vector3d point_in_cam = cam_from_world * point.point_in_world;
-    const double along = direction.dot(point_in_cam);
-    if (!(along > 0.0)) continue;
-    const double off = (point_in_cam - along * direction).norm() / along;
-    if (off < far_off) near.push_back({off, point_in_cam});
-  }
-  if (near.size() < num_near) return std::nullopt;
-  std::ranges::nth_element(near, near.begin() + num_near - 1, {}, &NearPoint::off);
-  near.resize(num_near);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const NearPoint& point : near) middle += point.point_in_world / static_cast<double>(num_near);
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const NearPoint& point : near)
-    scatter += (point.point_in_world - middle) * (point.point_in_world - middle).transpose();
-  const SymmetricEigen3 eigen = symmetric_eigen3(scatter);
-  const Eigen::Vector3d normal = eigen.vectors.col(0);
-  const double roughness = std::sqrt(std::max(eigen.values[0], 0.0) / static_cast<double>(num_near));
-  const double to_plane = normal.dot(middle), of_hit = normal.dot(hit_in_cam);
-  constexpr double grazing = 0.3;
-  if (std::abs(of_hit) < grazing * hit_in_cam.norm() || roughness > max_roughness * middle.norm()) return std::nullopt;
-  // n·X = c in units; where the beam hits it is s c in metres.
-  const double scale = of_hit / to_plane;
-  if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
-  return BeamScale{std::log(scale), roughness / middle.norm()};
-}
-
-/// Of the log of the scale by the beam's parameters: the median over the readings, since a moved beam may hit between
-/// other points.
-BeamVector of_beam_params(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
-                          std::span<const MapPoint> map) {
-  constexpr double step = 1e-5;  // m, rad and shares alike
-  std::array<std::vector<double>, num_beam_params> slopes;
-  for (const RangeReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s);
-    const auto scale = pose ? scale_at(*pose, beam, reading.range_m, map) : std::nullopt;
-    if (!scale) continue;
-    for (int k = 0; k < num_beam_params; ++k) {
-      const auto moved = scale_at(*pose, beam.retract(step * BeamVector::Unit(k)), reading.range_m, map);
-      if (moved) slopes[static_cast<std::size_t>(k)].push_back((moved->log_scale - scale->log_scale) / step);
-    }
-  }
-  BeamVector along = BeamVector::Zero();
-  for (int k = 0; k < num_beam_params; ++k) {
-    std::vector<double>& each = slopes[static_cast<std::size_t>(k)];
-    if (!each.empty()) along[k] = median_of(std::move(each));
-  }
-  return along;
-}
-
-/// σ of the scale by what is not known of the beam: an ordinary 0.5 % of its scale where the file says nothing.
-double sigma_by_beam(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
-                     std::span<const MapPoint> map) {
-  constexpr double ordinary_scale = 0.005;
-  if (!(beam.cov.diagonal().maxCoeff() > 0.0)) return ordinary_scale;
-  const BeamVector along = of_beam_params(readings, beam, path, map);
-  return std::sqrt(std::max(along.dot(beam.cov * along), 0.0));
-}
-
-}  // namespace
-
-std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
-                                        std::span<const PathStep> path, std::span<const MapPoint> map) {
-  std::vector<double> logs;  // in order of time
-  double roughness = 0.0;
-  for (const RangeReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s);
-    const auto scale = pose ? scale_at(*pose, beam, reading.range_m, map) : std::nullopt;
-    if (!scale) continue;
-    logs.push_back(scale->log_scale);
-    roughness += scale->roughness;
-  }
-  constexpr std::size_t num_blocks = 10;
-  if (logs.size() < 3 * num_blocks) return std::nullopt;
-  const std::size_t num_given = logs.size();
-  const double median = median_of(logs);
-  std::vector<double> sizes;
-  for (const double log : logs) sizes.push_back(std::abs(log - median));
-  const double limit = rejected_beyond * normal_from_mad * median_of(std::move(sizes));
-  std::erase_if(logs, [&](double log) { return std::abs(log - median) > limit; });
-  double sum = 0.0, squares = 0.0;
-  for (std::size_t i = 0; i < num_blocks; ++i) {
-    const std::size_t begin = i * logs.size() / num_blocks, end = (i + 1) * logs.size() / num_blocks;
-    double of_block = 0.0;
-    for (std::size_t k = begin; k < end; ++k) of_block += logs[k] / static_cast<double>(end - begin);
-    sum += of_block;
-    squares += of_block * of_block;
-  }
-  const double num = static_cast<double>(num_blocks), mean = sum / num;
-  ReadScale read{std::exp(mean), 0.0, logs.size(), num_given - logs.size()};
-  const double of_beam = sigma_by_beam(readings, beam, path, map);
-  // A curved surface is on one side of every plane through its points, by about as much as they are off it.
-  const double of_surface = roughness / static_cast<double>(num_given);
-  const double of_blocks = std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0));
-  read.sigma_rel = std::hypot(of_blocks, of_beam, of_surface);
-  constexpr double useless = 0.2;
-  return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }
 
 }  // namespace alidade

@@ -18,28 +18,40 @@ struct ReadScale {
   double scale = 1.0;      ///< Metres for each unit of the path.
   double sigma_rel = 1.0;  ///< Its σ over it.
   std::size_t num_used = 0, num_rejected = 0;
-  double late_s = 0.0;  ///< The readings' clock less the path's, where it is off.
+  double late_s = 0.0;    ///< The readings' clock less the path's, where it is off.
+  double offset_m = 0.0;  ///< By which a rangefinder reads too much, where it does.
+  double lag_s = 0.0;     ///< Time constant of a depth sensor's filter, where it has one.
 };
 
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
 [[nodiscard]] std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s);
 
+/// Covariance of the position at a time, in the world: of the frame at or after it.
+[[nodiscard]] Eigen::Matrix3d position_cov_at(std::span<const PathStep> path, double t_s);
+
+/// Mean square of what is alike in neighbours of what is left over of readings, in order of time: without half the mean
+/// squared step between two. No number of readings averages that.
+[[nodiscard]] double persistent_square(std::span<const Eigen::Vector3d> left);
+
 /// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of
 /// what is left over, whose neighbours in time are alike, and `sigma_rel`, which all share. Readings far from all
-/// others are rejected; a clock that is up to a second off is found by the residuals. None: the path moves too little
-/// up and down, or the readings do not fit it.
+/// others are rejected; a clock that is up to a second off, and a filter, are found by the residuals. None: the path
+/// moves too little up and down, or the readings do not fit it.
 [[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
                                                       std::span<const PathStep> path);
 
 /// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
-/// readings near their median, with the scatter of blocks of them as its σ. None: too few readings with points around
-/// them. σ of the beam is in it; where its file has none, 0.5 % of its scale.
+/// readings near their median, with the scatter of blocks of them as its σ. Where their distances say so, all of them
+/// are too long by one length: then that is estimated, too. None: too few readings with points around them. σ of the
+/// beam is in it; where its file has none, 0.5 % of its scale.
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 
 /// The straight ways between two positions, by odometry over by the path, of a twentieth of the whole way each: their
-/// mean, without those far from all others (wheels slip), with their scatter as σ, and `sigma_rel`, which all share.
-/// None: too few readings, or hardly a way.
+/// mean, without those far from all others (wheels slip), with their scatter as σ, `sigma_rel`, which all share, and
+/// what is persistently left over, beyond the path's σ, of a similarity of each fifth of the way: slipping lengthens
+/// all ways, a lag, and a plane in which the camera does not stay, shorten them. A clock that is up to a second off is
+/// found by the same. None: too few readings, hardly a way, or readings that do not fit the path.
 [[nodiscard]] std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> readings, double sigma_rel,
                                                          std::span<const PathStep> path);
 

@@ -9,6 +9,27 @@
 namespace alidade {
 namespace {
 
+/// By how much a sensor's readings are late, filtered or too long.
+void add_corrected(const SensorScale& sensor, Verdict& verdict) {
+  constexpr double unnamed_s = 0.1;  // beside a filter: what is left of its delay
+  if (std::abs(sensor.late_s) > (sensor.lag_s > 0.0 ? unnamed_s : 0.0))
+    verdict.checks.push_back({sensor.sensor + " clock", State::care,
+                              "the clock of the " + sensor.sensor + " is " + text_of(std::abs(sensor.late_s), 2) +
+                                  " s " + (sensor.late_s > 0.0 ? "after" : "before") + " the camera's: corrected",
+                              std::abs(sensor.late_s), 0.0, "s", "path"});
+  if (sensor.lag_s > 0.0)
+    verdict.checks.push_back({sensor.sensor + " filter", State::care,
+                              "the readings of the " + sensor.sensor + " are filtered, with a time constant of " +
+                                  text_of(sensor.lag_s, 2) + " s: corrected; have it read without",
+                              sensor.lag_s, 0.0, "s", "path"});
+  if (sensor.offset_m != 0.0)
+    verdict.checks.push_back({sensor.sensor + " offset", State::care,
+                              "the readings of the " + sensor.sensor + " are " + text_of(std::abs(sensor.offset_m), 2) +
+                                  " m too " + (sensor.offset_m > 0.0 ? "long" : "short") +
+                                  ": corrected; its beam begins elsewhere than --beam says",
+                              std::abs(sensor.offset_m), 0.0, "m", "path"});
+}
+
 /// Readings that are not in metres, or of another clock.
 void add_readings(const SensorScale& sensor, Verdict& verdict) {
   constexpr double fast = 5.0;
@@ -17,11 +38,7 @@ void add_readings(const SensorScale& sensor, Verdict& verdict) {
                               "by the " + sensor.sensor + " the camera accelerates " + text_of(sensor.acceleration, 2) +
                                   " times as much as --sigma-a says: are its readings in metres?",
                               sensor.acceleration, fast, "1", "path"});
-  if (sensor.late_s != 0.0)
-    verdict.checks.push_back({sensor.sensor + " clock", State::care,
-                              "the clock of the " + sensor.sensor + " is " + text_of(std::abs(sensor.late_s), 2) +
-                                  " s " + (sensor.late_s > 0.0 ? "after" : "before") + " the camera's: corrected",
-                              std::abs(sensor.late_s), 0.0, "s", "path"});
+  add_corrected(sensor, verdict);
 }
 
 /// Why a sensor's readings do not determine the scale.
@@ -29,9 +46,9 @@ std::string unread_text(const SensorScale& sensor, const Localization& report) {
   if (sensor.sensor == "IMU") return imu_fault_text(*report.imu);
   return "the readings of the " + sensor.sensor + " do not determine the scale: " +
          (!sensor.is_in_time            ? "none of them is of the time of the path (t_s)"
-          : sensor.sensor == "odometry" ? "too few of them, or the camera hardly moves"
+          : sensor.sensor == "odometry" ? "too few of them, they do not fit the path, or the camera hardly moves"
           : sensor.sensor == "depth sensor"
-              ? "too few of them, or the camera moves too little up and down"
+              ? "too few of them, they do not fit the path, or the camera moves too little up and down"
               : "too few of them, or too few points around the beam that lie on a surface");
 }
 

@@ -1,6 +1,10 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
+#include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/similarity.h"
 #include "alidade/localize/checks/scale_readings.h"
 
 // Odometry's scale, and what all sensors say together.
@@ -13,20 +17,126 @@ namespace {
 /// Where the camera and the vehicle were at a time.
 struct Place {
   Eigen::Vector3d of_path, of_vehicle;
-  double way_m = 0.0;  ///< By odometry, since the first.
+  double way_m = 0.0;          ///< By odometry, since the first.
+  double path_variance = 0.0;  ///< Of the path's position, all three axes.
 };
 
-/// At the times of the readings.
-std::vector<Place> places_of(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
+/// At the times of the readings, by a clock that is late by so much.
+std::vector<Place> places_of(std::span<const OdometryReading> readings, double late_s, std::span<const PathStep> path) {
   std::vector<Place> places;
   for (const OdometryReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s);
+    const auto pose = pose_at(path, reading.t_s - late_s);
     if (!pose) continue;
-    Place place{pose->translation, reading.position_m, 0.0};
+    Place place{pose->translation, reading.position_m, 0.0, position_cov_at(path, reading.t_s - late_s).trace()};
     if (!places.empty()) place.way_m = places.back().way_m + (place.of_vehicle - places.back().of_vehicle).norm();
     places.push_back(place);
   }
   return places;
+}
+
+/// Sums of squares over some places.
+struct PartFit {
+  double extent_m2 = 0.0;   ///< Of the vehicle's from their middle.
+  double of_path_m2 = 0.0;  ///< Of what the path's σ explains of what is left over.
+};
+
+/// What is left over of a similarity of some places, in metres, and of those along a line of their distances on it.
+std::vector<Eigen::Vector3d> left_over(std::span<const Place> places, PartFit& part) {
+  std::vector<Eigen::Vector3d> of_path, of_vehicle, left;
+  Eigen::Vector3d middle_of_path = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();
+  for (const Place& place : places) {
+    of_path.push_back(place.of_path);
+    of_vehicle.push_back(place.of_vehicle);
+    middle_of_path += place.of_path / static_cast<double>(places.size());
+    middle += place.of_vehicle / static_cast<double>(places.size());
+  }
+  const auto there = aligned(of_path, of_vehicle, false);
+  const Eigen::Vector3d along_path = (of_path.back() - of_path.front()).normalized();
+  const Eigen::Vector3d along = (of_vehicle.back() - of_vehicle.front()).normalized();
+  double products = 0.0, squares = 0.0, extent_of_path = 0.0, path_variances = 0.0;
+  for (const Place& place : places) {
+    const double x = along_path.dot(place.of_path - middle_of_path);
+    products += x * along.dot(place.of_vehicle - middle);
+    squares += x * x;
+    part.extent_m2 += (place.of_vehicle - middle).squaredNorm();
+    extent_of_path += (place.of_path - middle_of_path).squaredNorm();
+    path_variances += place.path_variance;
+  }
+  if (extent_of_path > 0.0) part.of_path_m2 = path_variances * part.extent_m2 / extent_of_path;
+  const double scale = squares > 0.0 ? products / squares : 0.0;
+  for (const Place& place : places)
+    left.push_back(there ? place.of_vehicle -
+                               (there->scale * (there->b_from_a.rotation * place.of_path) + there->b_from_a.translation)
+                         : Eigen::Vector3d((along.dot(place.of_vehicle - middle) -
+                                            scale * along_path.dot(place.of_path - middle_of_path)) *
+                                           along));
+  return left;
+}
+
+/// How a path fits odometry, fifth by fifth of the way: odometry's frame turns with its errors.
+struct WayFit {
+  double misfit_m2 = std::numeric_limits<double>::infinity();  ///< Mean square of what is left over.
+  double persistent = 1.0;     ///< RMS of what of that is persistent, over that of the vehicle's places.
+  double num_independent = 1;  ///< As many readings determine as much.
+};
+
+WayFit way_fit(std::span<const Place> places) {
+  constexpr std::size_t most_parts = 5, readings_each = 10, enough = 5;
+  const std::size_t num_parts = std::clamp(places.size() / readings_each, std::size_t{1}, most_parts);
+  double extent = 0.0, alike = 0.0, persistent = 0.0, squares = 0.0, num = 0.0;
+  const auto part_of = [&](std::size_t i) {
+    const double share = places[i].way_m / places.back().way_m;
+    return std::min(static_cast<std::size_t>(static_cast<double>(num_parts) * share), num_parts - 1);
+  };
+  for (std::size_t begin = 0, end = 0; begin < places.size(); begin = end) {
+    while (end < places.size() && part_of(end) == part_of(begin)) ++end;
+    if (end - begin < enough) continue;
+    PartFit part;
+    const std::vector<Eigen::Vector3d> left = left_over(places.subspan(begin, end - begin), part);
+    extent += part.extent_m2;
+    const double here = static_cast<double>(left.size());
+    // seven numbers of three coordinates each
+    const double freed = 3.0 * here / (3.0 * here - 7.0);
+    const double of_part = here * freed * persistent_square(left);
+    alike += of_part;
+    persistent += std::max(of_part - part.of_path_m2, 0.0);
+    for (const Eigen::Vector3d& each : left) squares += freed * each.squaredNorm();
+    num += here;
+  }
+  if (!(extent > 0.0)) return {};
+  const double correlation = squares > 0.0 ? std::clamp(alike / squares, 0.0, 0.98) : 0.0;
+  return {squares / num, std::sqrt(persistent / extent), num * (1.0 - correlation) / (1.0 + correlation)};
+}
+
+/// How far a path leaves the plane that it is nearest to, over all of it: to an odometry of two coordinates that is
+/// lost.
+double out_of_plane(std::span<const Place> places) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Place& place : places) middle += place.of_path / static_cast<double>(places.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Place& place : places) scatter += (place.of_path - middle) * (place.of_path - middle).transpose();
+  const Eigen::Vector3d squares = symmetric_eigen3(scatter).values;
+  return squares.sum() > 0.0 ? std::sqrt(std::max(squares[0], 0.0) / squares.sum()) : 0.0;
+}
+
+/// How late odometry's clock is, where that explains clearly more than no offset: the least of a parabola through the
+/// best of a grid.
+double clock_of(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
+  constexpr double step_s = 0.05, clear = 12.0;  // of χ², 3.5σ
+  constexpr int most = 20;
+  std::array<WayFit, 2 * most + 1> fits;
+  for (int i = -most; i <= most; ++i) {
+    const std::vector<Place> places = places_of(readings, step_s * i, path);
+    if (!places.empty() && places.back().way_m > 0.0) fits[static_cast<std::size_t>(i + most)] = way_fit(places);
+  }
+  const auto best = static_cast<std::size_t>(std::ranges::min_element(fits, {}, &WayFit::misfit_m2) - fits.begin());
+  if (best == 0 || best + 1 == fits.size()) return 0.0;
+  const double before = fits[best - 1].misfit_m2, least = fits[best].misfit_m2, after = fits[best + 1].misfit_m2;
+  if (!std::isfinite(before + after)) return 0.0;
+  if (!(fits[most].misfit_m2 - least > clear * least / fits[best].num_independent)) return 0.0;
+  const double curve = before - 2.0 * least + after;
+  const double share = curve > 0.0 ? 0.5 * (before - after) / curve : 0.0;
+  return step_s * (static_cast<double>(best) - most + std::clamp(share, -1.0, 1.0));
 }
 
 /// Of the path, in its unit: differences of the mean rates of seconds one after the other, which noise hardly enters.
@@ -53,7 +163,8 @@ std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> read
                                            std::span<const PathStep> path) {
   constexpr double num_ways = 20.0;
   constexpr std::size_t enough = 10;
-  const std::vector<Place> places = places_of(readings, path);
+  const double late_s = clock_of(readings, path);
+  const std::vector<Place> places = places_of(readings, late_s, path);
   if (places.size() < enough || !(places.back().way_m > 0.0)) return std::nullopt;
   std::vector<double> logs;
   std::size_t begin = 0;
@@ -77,7 +188,11 @@ std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> read
   const double num = static_cast<double>(logs.size()), mean = sum / num;
   for (const double log : logs) squares += (log - mean) * (log - mean);
   const double of_ways = std::sqrt(squares / (num * (num - 1.0)));
-  ReadScale read{std::exp(mean), std::hypot(of_ways, sigma_rel), logs.size(), num_given - logs.size()};
+  const bool is_in_plane = std::ranges::all_of(
+      readings, [&](const OdometryReading& each) { return each.position_m.z() == readings.front().position_m.z(); });
+  const double lost = is_in_plane ? out_of_plane(places) : 0.0;
+  const double sigma = std::hypot(std::hypot(of_ways, way_fit(places).persistent, sigma_rel), lost);
+  ReadScale read{std::exp(mean), sigma, logs.size(), num_given - logs.size(), late_s};
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }
@@ -95,6 +210,8 @@ void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Lo
                read->num_rejected,
                true,
                read->late_s,
+               read->offset_m,
+               read->lag_s,
                read->scale * acceleration / config.filter.sigma_a_m_s2};
     scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {
       return !result.path.empty() && reading.t_s >= result.path.front().t_s && reading.t_s <= result.path.back().t_s;

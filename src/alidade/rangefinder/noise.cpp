@@ -9,23 +9,23 @@
 namespace alidade {
 namespace {
 
-/// One kind of measurement: its squared residuals, each in units of its σ², and what the beam takes up of them.
+/// One kind of noise: squared residuals, as far as they are of it, and what the beam takes up of them.
 struct Group {
   double sum = 0.0;
   double num = 0.0;
   BeamMatrix H = BeamMatrix::Zero();
 };
 
-/// Adds rows whose covariance is `own` (the kind's noise) + `carried` (the plane's, the reading's): a residual r counts
-/// for the noise by the share of it that is the noise's.
+/// Adds rows of covariance `all`, of which `kind` is the kind's noise: a residual counts for it by the share of it that
+/// is the kind's (the score of ln σ²), so that spots that say little, whose σ may be larger than their errors, say
+/// nothing of the readings' noise.
 template <int rows>
 void add(Group& group, const Eigen::Matrix<double, rows, 1>& r, const Eigen::Matrix<double, rows, num_beam_params>& J,
-         const Eigen::Matrix<double, rows, rows>& own, const Eigen::Matrix<double, rows, rows>& carried) {
-  const Eigen::Matrix<double, rows, rows> all = own + carried;
-  const Eigen::Matrix<double, rows, rows> weight = all.inverse();
-  group.sum += r.dot(weight * r);
-  group.num += rows;
-  group.H += J.transpose() * weight * J;
+         const Eigen::Matrix<double, rows, rows>& kind, const Eigen::Matrix<double, rows, rows>& all) {
+  const Eigen::Matrix<double, rows, rows> weight = all.inverse(), of_kind = weight * kind * weight;
+  group.sum += r.dot(of_kind * r);
+  group.num += (weight * kind).trace();
+  group.H += J.transpose() * of_kind * J;
 }
 
 /// Factor on σ that makes the residuals as large as they should be. One degree of freedom of the guess keeps few
@@ -42,7 +42,7 @@ double factor_of(const Group& group, const BeamMatrix& H, int num_free, double s
 }
 
 struct Groups {
-  Group ranges, spots;
+  Group ranges, spots, readings;  ///< `readings`: their share of spots that brought a σ of their own.
   BeamMatrix H = BeamMatrix::Zero();
 };
 
@@ -54,16 +54,18 @@ Groups groups_of(const BeamProblem& problem, const Camera& camera, const Beam& b
     if (!residual) continue;
     const Eigen::MatrixXd cov = full_covariance(shot, *residual);
     if (shot.plane) {
-      const Eigen::Matrix<double, 1, 1> own(residual->noise_cov(0, 0)), carried(cov(0, 0) - own[0]);
-      if (!shot.sigma_range_m)
-        add<1>(groups.ranges, residual->r.head<1>(), residual->J_beam.topRows<1>(), own, carried);
+      const Eigen::Matrix<double, 1, 1> all(cov(0, 0));
+      if (!shot.sigma_range_m) add<1>(groups.ranges, residual->r.head<1>(), residual->J_beam.topRows<1>(), all, all);
     }
     if (shot.spot_px && (!shot.owns_spot_sigma || !shot.plane)) {
       const Eigen::Matrix2d own = shot.sigma_spot_px * shot.sigma_spot_px * Eigen::Matrix2d::Identity();
-      const Eigen::Matrix2d carried = cov.bottomRightCorner<2, 2>() - own;
+      const Eigen::Matrix2d all = cov.bottomRightCorner<2, 2>(), of_reading = all - own;
+      const Eigen::Vector2d r = residual->r.tail<2>();
+      const Eigen::Matrix<double, 2, num_beam_params> J = residual->J_beam.bottomRows<2>();
       // A spot without a board holds the reading's error, too; it determines the kind that is not known.
-      Group& group = shot.plane || of_spots ? groups.spots : groups.ranges;
-      add<2>(group, residual->r.tail<2>(), residual->J_beam.bottomRows<2>(), own, carried);
+      if (shot.plane || of_spots) add<2>(groups.spots, r, J, all, all);
+      if (!shot.plane && !of_spots) add<2>(groups.ranges, r, J, of_reading, all);
+      if (!shot.plane && shot.min_sigma_spot_px > 0.0) add<2>(groups.readings, r, J, of_reading, all);
     }
     const auto W = whitener_of(cov);
     const Eigen::Matrix<double, Eigen::Dynamic, num_beam_params, 0, 3> J = W * residual->J_beam;
@@ -90,9 +92,10 @@ double estimate_noise(BeamProblem& problem, const Camera& camera, const Beam& be
   if (of_ranges) {
     RangeNoise& noise = problem.model.noise;
     double factor = factor_of(groups.ranges, groups.H, p, noise.sigma_m / guessed_sigma_m);
-    // Spots alone: one factor for both, as their residuals hold both.
+    // Spots alone: one factor for both, as their residuals hold both, but where the spots' finder knows more of theirs.
     if (groups.ranges.num == 0.0 && of_spots)
-      factor = factor_of(groups.spots, groups.H, p, noise.sigma_m / guessed_sigma_m);
+      factor = factor_of(groups.readings.num > 0.0 ? groups.readings : groups.spots, groups.H, p,
+                         noise.sigma_m / guessed_sigma_m);
     noise = {noise.sigma_m * factor, noise.per_m * factor, noise.incidence_m * factor};
     change = std::abs(factor - 1.0);
   }

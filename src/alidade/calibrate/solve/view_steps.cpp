@@ -55,7 +55,7 @@ std::vector<ClusterStep> dense_steps(const BundleProblem& problem, const BundleR
     own = eq.dense_of(view);
     own.noalias() -= rows.leftCols(dense).transpose().lazyProduct(rows);  // the pose follows
   }
-  // All views at once: a product of small matrices takes three times as long as its share of a large one.
+  // All views at once: many products of small matrices take longer than one of a large one.
   const Eigen::MatrixXd pulls = X.transpose() * reduced;
   Eigen::MatrixXd turned(dense, num_lens * num);
   for (Index k = 0; k < num; ++k)

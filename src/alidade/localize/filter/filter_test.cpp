@@ -217,7 +217,7 @@ TEST(LocalizationFilter, AWorldThatShrinksToNothingLeavesNumbers) {
     LocalizationFilter filter(camera, {}, cov, config);
     std::vector<FeatureObservation> seen;
     for (long id = 1; id <= 4; ++id) {
-      const Eigen::Vector3d point((id % 2) * 0.1 - 0.05, (id / 3) * 0.1 - 0.05, 1.0);
+      const Eigen::Vector3d point(id % 2 == 0 ? -0.05 : 0.05, id < 3 ? -0.05 : 0.05, 1.0);
       filter.add_known(id, point, 1e-6);
       const Eigen::Vector3d nearer(apart * point.x(), apart * point.y(), 1.0);
       seen.push_back({id, *project(camera, nearer), 0.0});

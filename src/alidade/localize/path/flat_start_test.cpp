@@ -47,7 +47,7 @@ std::vector<TimedPose> timed(const SmootherProblem& problem, std::span<const Rig
 
 /// A wrong path is not where the second guess begins, and what it comes to is the truth up to a similarity.
 TEST(FlatStart, OwesNothingToThePathThatIsHandedOver) {
-  for (const std::uint64_t seed : {31, 32, 33}) {
+  for (const std::uint64_t seed : {31u, 32u, 33u}) {
     const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 40}, seed);
     const SmootherProblem wrong = problem_of(run, {0.0, 0.02, 0.01});
     const auto flat = flat_start(wrong);

@@ -26,11 +26,11 @@ struct ReadScale {
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
 [[nodiscard]] std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s);
 
-/// Covariance of the position at a time, in the world: of the frame at or after it.
+/// Covariance of the position at a time, in the world [the path's unit²]: of the frame at or after it.
 [[nodiscard]] Eigen::Matrix3d position_cov_at(std::span<const PathStep> path, double t_s);
 
 /// Mean square of what is alike in neighbours of what is left over of readings, in order of time: without half the mean
-/// squared step between two. No number of readings averages that.
+/// squared step between two, in the unit of `left`, squared. No number of readings averages that.
 [[nodiscard]] double persistent_square(std::span<const Eigen::Vector3d> left);
 
 /// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of

@@ -66,6 +66,17 @@ struct Drawn {
   }
 };
 
+/// Of so many paths: `scale_of(path, seed)`.
+template <class ScaleOf>
+Drawn drawn_of(int num, const ScaleOf& scale_of) {
+  Drawn drawn;
+  for (int i = 1; i <= num; ++i) {
+    const auto seed = static_cast<std::uint64_t>(i);
+    drawn.add(scale_of(Swaying(seed), seed));
+  }
+  return drawn;
+}
+
 // ---- odometry
 
 enum class WheelFault { right, slipping, filtered, in_a_plane, late };
@@ -96,13 +107,9 @@ std::vector<OdometryReading> odometry(const Swaying& swaying, WheelFault fault, 
 }
 
 Drawn drawn_odometry(WheelFault fault, int num) {
-  Drawn drawn;
-  for (int seed = 1; seed <= num; ++seed) {
-    const Swaying swaying(static_cast<std::uint64_t>(seed));
-    drawn.add(
-        scale_by_odometry(odometry(swaying, fault, static_cast<std::uint64_t>(seed)), 0.01, swaying.path(duration_s)));
-  }
-  return drawn;
+  return drawn_of(num, [&](const Swaying& swaying, std::uint64_t seed) {
+    return scale_by_odometry(odometry(swaying, fault, seed), 0.01, swaying.path(duration_s));
+  });
 }
 
 TEST(SensorFaults, OdometryAsItShouldBeGivesItsScale) {
@@ -156,12 +163,9 @@ std::vector<DepthReading> depths(const Swaying& swaying, DepthFault fault, std::
 }
 
 Drawn drawn_depths(DepthFault fault, int num) {
-  Drawn drawn;
-  for (int seed = 1; seed <= num; ++seed) {
-    const Swaying swaying(static_cast<std::uint64_t>(seed));
-    drawn.add(scale_by_depth(depths(swaying, fault, static_cast<std::uint64_t>(seed)), 0.01, swaying.path(duration_s)));
-  }
-  return drawn;
+  return drawn_of(num, [&](const Swaying& swaying, std::uint64_t seed) {
+    return scale_by_depth(depths(swaying, fault, seed), 0.01, swaying.path(duration_s));
+  });
 }
 
 TEST(SensorFaults, DepthsAsTheyShouldBeGiveTheirScale) {

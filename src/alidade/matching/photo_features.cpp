@@ -46,6 +46,10 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> found, const cv::Size
   return kept;
 }
 
+/// By how much OpenCV's SIFT reads a position too large: it doubles the image about the pixels' outer borders, and
+/// halves the positions found there about the centre of the first pixel.
+constexpr double sift_shift_px = 0.25;
+
 }  // namespace
 
 PhotoFeatures find_features(const cv::Mat& photo, const FeatureConfig& config) {
@@ -61,7 +65,8 @@ PhotoFeatures find_features(const cv::Mat& photo, const FeatureConfig& config) {
   features.descriptors.resize(descriptors.rows, descriptors.cols);
   for (int i = 0; i < descriptors.rows; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    features.px.emplace_back((kept[at].pt.x + 0.5) / shrunk - 0.5, (kept[at].pt.y + 0.5) / shrunk - 0.5);
+    const Eigen::Array2d seen = Eigen::Array2d(kept[at].pt.x, kept[at].pt.y) - sift_shift_px;
+    features.px.emplace_back((seen + 0.5) / shrunk - 0.5);
     const Eigen::Map<const Eigen::RowVectorXf> values(descriptors.ptr<float>(i), descriptors.cols);
     features.descriptors.row(i) = (values / std::max(values.sum(), 1e-6F)).cwiseMax(0.0F).cwiseSqrt();
   }

@@ -41,11 +41,12 @@ Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
   return clock;
 }
 
-/// Assumptions. By definition: angles are the encoder's own radians.
+/// Assumptions. By definition: angles are the encoder's own radians, and a command is valid from its own time on.
 std::vector<Assumption> assumed_of(const ServoIdentification& identified, double sigma_clock) {
   const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
-                                     assumed_clock(identified.fit, sigma_clock)};
+                                     assumed_clock(identified.fit, sigma_clock),
+                                     {.name = "command_offset_s", .value = 0.0, .sigma = 0.0, .moved = "latency_s"}};
   for (const CountedFlaw& counted : identified.counted) {
     const bool is_listed =
         std::ranges::any_of(identified.hidden, [&](const HiddenFlaw& hidden) { return hidden.flaw == counted.flaw; });

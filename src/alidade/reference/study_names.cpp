@@ -55,6 +55,7 @@ dead_band               1      commands no larger do nothing
 backlash_rad            rad    between drive and encoder
 second_tau_s            s      second lag, of the command
 clock_rate              1      by which a second of the angles' clock is longer than one of the commands'
+earlier_command         -      what the axis followed until the first row's command took effect, less that command
 evidence.*              1      of each of these: 2 ln of the likelihood ratio for it
 encoder_step_rad        rad    one count
 encoder_hz              Hz     how often it is sampled, where its angle is held for several rows; 0: not seen

@@ -48,20 +48,28 @@ struct ServoFlaws {
   double backlash_rad = 0.0;  ///< Play between what drives the axis and the angle that is read.
   double second_tau_s = 0.0;  ///< A first-order lag of the command, before the plant.
   double clock_rate = 0.0;    ///< Angles are read by a clock of which a second is 1 + it of the commands'.
+  /// What the axis followed until the first row's command took effect, less that command: of the log, not of the axis.
+  double earlier_command = 0.0;
 };
-inline constexpr std::size_t num_servo_flaws = 6;
+inline constexpr std::size_t num_servo_flaws = 7;
 inline constexpr std::array<double ServoFlaws::*, num_servo_flaws> servo_flaws{
     &ServoFlaws::max_rate_rad_s, &ServoFlaws::max_acceleration_rad_s2,
     &ServoFlaws::dead_band,      &ServoFlaws::backlash_rad,
-    &ServoFlaws::second_tau_s,   &ServoFlaws::clock_rate};
+    &ServoFlaws::second_tau_s,   &ServoFlaws::clock_rate,
+    &ServoFlaws::earlier_command};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_names{
-    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band", "backlash_rad", "second_tau_s", "clock_rate"};
+    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band", "backlash_rad", "second_tau_s",
+    "clock_rate",     "earlier_command"};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
-    "a limit of its rate", "a limit of its acceleration",
-    "a dead band",         "backlash",
-    "a second lag",        "a drift between the clocks of commands and angles"};
-inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/s", "rad/s^2", "units of command",
-                                                                           "rad",   "s",       "s/s"};
+    "a limit of its rate",
+    "a limit of its acceleration",
+    "a dead band",
+    "backlash",
+    "a second lag",
+    "a drift between the clocks of commands and angles",
+    "another command before the first row's"};
+inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{
+    "rad/s", "rad/s^2", "units of command", "rad", "s", "s/s", "units of command"};
 
 struct ServoFit {
   ServoKind kind = ServoKind::angle;

@@ -53,7 +53,9 @@ std::string servo_plant_text(const ServoFit& fit) {
   for (const std::size_t flaw : fit.freed) {
     const double size = fit.flaws.*servo_flaws[flaw];
     const std::string name = servo_flaw_names[flaw];
-    if (servo_flaws[flaw] == &ServoFlaws::clock_rate) continue;  // of the log, not of the axis
+    const bool is_of_log =
+        servo_flaws[flaw] == &ServoFlaws::clock_rate || servo_flaws[flaw] == &ServoFlaws::earlier_command;
+    if (is_of_log) continue;  // not of the axis
     const bool is_rad = name.find("rad") != std::string::npos;
     std::string key = name;
     if (const auto at = key.find("rad"); is_rad) key.replace(at, 3, "deg");

@@ -187,7 +187,7 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
   count_time_stamps(log, J, *inverse, result);
 }
 
-/// Which flaws to try: all where the residuals of a linear fit indicate one, the clock alone where only that is.
+/// Which flaws to try: all where the residuals of a linear fit indicate one of the axis, else those of the log alone.
 std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr double max_correlation = 0.3, min_sigmas = 3.5;
   const FlawGround ground = flaw_ground(log, fit);
@@ -199,8 +199,8 @@ std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const
   std::vector<std::size_t> indicated;
   for (const std::size_t flaw : all)
     if (sum2 > 0.0 && flaw_scores(log, fit, ground, flaw).front().gain2 > least2) indicated.push_back(flaw);
-  const bool is_clock = indicated == std::vector<std::size_t>{ServoFlaw::clock_rate};
-  return indicated.empty() || is_clock ? indicated : all;
+  const bool is_of_log = std::ranges::all_of(indicated, is_of_the_log);
+  return is_of_log ? indicated : all;
 }
 
 }  // namespace

@@ -158,6 +158,39 @@ TEST(ServoCauses, FlawsAreEstimated) {
   }
 }
 
+/// A log that begins with a command while an earlier one still has its effect: at rest, and in the middle of a run.
+TEST(ServoCauses, AnEarlierCommandIsEstimated) {
+  const auto draws = static_cast<std::uint64_t>(testing::trials(6));
+  int good = 0, runs = 0;
+  double sum2 = 0.0;
+  for (const bool is_rate_plant : {false, true}) {
+    for (const double from_s : {0.5, 1.4}) {
+      for (std::uint64_t seed = 1; seed <= draws; ++seed, ++runs) {
+        const ServoLogScene scene = late_scene(is_rate_plant);
+        std::vector<ServoSample> log = log_of(scene, seed);
+        std::erase_if(log, [&](const ServoSample& row) { return row.t_s < from_s - 1e-9; });
+        const ServoIdentification identified = identify_servo(log);
+        const ServoFit& fit = identified.fit;
+        ASSERT_EQ(std::ranges::count(fit.freed, ServoFlaw::earlier_command), 1) << is_rate_plant << from_s << seed;
+        const double change = from_s < 1.0 ? -200.0 : 300.0;
+        const std::array<double, 4> errors{
+            (fit.params[0] - gain_of(scene.axis.plant)) / std::sqrt(fit.cov(0, 0)),
+            (fit.params[1] - tau_of(scene.axis.plant)) / std::sqrt(fit.cov(1, 1)),
+            (fit.params[2] - 0.083) / std::sqrt(fit.cov(2, 2)),
+            (fit.flaws.earlier_command - change) / fit.flaw_sigma[ServoFlaw::earlier_command]};
+        const bool is_good = identify_verdict(log, identified).state == State::good;
+        good += is_good ? 1 : 0;
+        for (const double error : errors) {
+          sum2 += error * error / 4.0;
+          if (is_good) EXPECT_LT(std::abs(error), 5.0) << is_rate_plant << from_s << seed;
+        }
+      }
+    }
+  }
+  EXPECT_GE(good, runs - runs / 10) << "of " << runs;
+  EXPECT_LT(sum2 / runs, 1.0 + 5.0 * std::sqrt(2.0 / (4.0 * runs)));
+}
+
 /// A dead band too small to be detected in a chirp, whose commands are nearly all large: σ includes its typical
 /// size.
 TEST(ServoCauses, FlawsTooSmallToSeeAreCounted) {

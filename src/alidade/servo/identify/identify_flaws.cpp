@@ -89,9 +89,13 @@ class FlawedServo {
   double lagged_, read_ = 0.0;
 };
 
-/// What a step of one is in a flaw's size: all but the clock's have one sign, and go by factors.
-double unit_of(const ServoFlaws& flaws, std::size_t flaw) {
-  return flaw == ServoFlaw::clock_rate ? clock_unit : flaws.*servo_flaws[flaw];
+/// What a step of one is in a flaw's size: those of an axis have one sign, and go by factors; those of its log have
+/// either.
+double unit_of(const ServoFit& fit, std::size_t flaw) {
+  constexpr double turn_rad = 0.1;
+  if (flaw == ServoFlaw::clock_rate) return clock_unit;
+  if (flaw == ServoFlaw::earlier_command) return turn_rad / std::max(std::abs(fit.params[ServoParam::gain]), 1e-300);
+  return fit.flaws.*servo_flaws[flaw];
 }
 
 /// What a step of one parameter or freed flaw makes of a fit.
@@ -103,6 +107,10 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
   } else {
     const std::size_t flaw = fit.freed[static_cast<std::size_t>(param - num_servo_params)];
     double& size = next.flaws.*servo_flaws[flaw];
+    if (flaw == ServoFlaw::earlier_command) {  // the response is linear in it
+      size += by * unit_of(fit, flaw);
+      return next;
+    }
     by = std::clamp(by, -1.0, 1.0);
     size = flaw == ServoFlaw::clock_rate ? std::clamp(size + clock_unit * by, -max_clock_rate, max_clock_rate)
                                          : size * std::exp(by);
@@ -179,6 +187,8 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
       return times(response.maxCoeff() - response.minCoeff(), {0.002, 0.005, 0.01, 0.02, 0.05, 0.1});
     case ServoFlaw::clock_rate:  // by the end a part of the time constant
       return times(fit.params[ServoParam::tau] / (log.back().t_s - log.front().t_s), {-0.2, -0.02, 0.02, 0.2});
+    case ServoFlaw::earlier_command:
+      return times(max_command(log), {-1.0, 1.0});
     default:
       return times(fit.params[ServoParam::tau], {0.1, 0.3, 0.6, 1.0});
   }
@@ -190,9 +200,9 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
   const std::vector<double> times_s = reading_times(log);
   const double begin_s = std::min(log.front().t_s, times_s.front());
   Eigen::VectorXd angles(static_cast<Index>(times_s.size()));
-  FlawedServo servo(fit, flaws, log.front().command);
-  double now_s = begin_s, command = log.front().command;
-  std::size_t next = 1;
+  double now_s = begin_s, command = log.front().command + flaws.earlier_command;
+  FlawedServo servo(fit, flaws, command);
+  std::size_t next = 0;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     const double read_s = times_s[i] + flaws.clock_rate * (times_s[i] - begin_s);
     for (; next < log.size() && log[next].given_s() + fit.params[ServoParam::latency] <= read_s; ++next) {
@@ -239,7 +249,7 @@ double effective_rows(const Eigen::VectorXd& misfit) {
 Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit) {
   Eigen::MatrixXd J = jacobian_by_factors(log, fit);
   for (std::size_t i = 0; i < fit.freed.size(); ++i)
-    J.col(num_servo_params + static_cast<Index>(i)) /= unit_of(fit.flaws, fit.freed[i]);
+    J.col(num_servo_params + static_cast<Index>(i)) /= unit_of(fit, fit.freed[i]);
   return J;
 }
 

@@ -9,8 +9,21 @@ namespace alidade {
 
 /// Indices in servo_flaws.
 struct ServoFlaw {
-  enum Place : std::size_t { rate_limit, acceleration_limit, dead_band, backlash, second_lag, clock_rate };
+  enum Place : std::size_t {
+    rate_limit,
+    acceleration_limit,
+    dead_band,
+    backlash,
+    second_lag,
+    clock_rate,
+    earlier_command
+  };
 };
+
+/// The log's, not the axis': of either sign.
+[[nodiscard]] constexpr bool is_of_the_log(std::size_t flaw) {
+  return flaw == ServoFlaw::clock_rate || flaw == ServoFlaw::earlier_command;
+}
 
 /// Angles that a servo of this fit, with its flaws, reads at the times of the log. In closed form, but for a second
 /// lag, which is stepped through.

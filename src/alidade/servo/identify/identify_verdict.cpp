@@ -5,6 +5,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
+#include "alidade/servo/identify/identify_flaws.h"
 #include "alidade/servo/identify/log_times.h"
 #include "alidade/servo/identify/sampled_log.h"
 
@@ -33,8 +34,12 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
                       " from row to row): the servo does more than the model; σ counts that rows share errors",
        correlation, limit, "1", ""});
   ClusterCovariance clusters = identified.clusters;
-  // Where it was before the log is seen in its first rows alone: one block, whose own scatter says nothing of others.
-  if (clusters.inflation.size() > ServoParam::start) clusters.inflation[ServoParam::start] = 1.0;
+  // What was before the log is seen in its first rows alone: one block, whose own scatter says nothing of others.
+  std::vector<Eigen::Index> before{ServoParam::start};
+  for (std::size_t i = 0; i < fit.freed.size(); ++i)
+    if (fit.freed[i] == ServoFlaw::earlier_command) before.push_back(num_servo_params + static_cast<Eigen::Index>(i));
+  for (const Eigen::Index place : before)
+    if (clusters.inflation.size() > place) clusters.inflation[place] = 1.0;
   verdict.checks.push_back(clusters_agree(
       clusters, "block", std::to_string(identified.correlated_rows) + " rows in a row share an error", "response"));
   const double step_s = identified.duration_s / (rows - 1.0);

@@ -73,7 +73,7 @@ struct SensorScale {
   bool is_in_time = true;     ///< There are readings within the time span of the path.
   double late_s = 0.0;        ///< The readings' clock less the camera's, where it is off: corrected.
   double offset_m = 0.0;      ///< By which a rangefinder's readings are too long, where they are: corrected.
-  double lag_s = 0.0;         ///< Time constant of a depth sensor's filter, where it has one: corrected.
+  double lag_s = 0.0;         ///< Time constant of the filter of a depth sensor or odometry, if any: corrected.
   double acceleration = 0.0;  ///< RMS of the camera's by this scale, over the one that is given.
 };
 

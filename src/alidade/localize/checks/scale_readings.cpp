@@ -39,6 +39,34 @@ double persistent_square(std::span<const Eigen::Vector3d> left) {
   return std::max(0.0, squares / num - steps / (num - 1.0));
 }
 
+std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s) {
+  constexpr double forgotten = 3.0;  // time constants
+  std::vector<PathStep> steps(path.begin(), path.end());
+  const PathStep* last = nullptr;
+  double since_s = 0.0;
+  for (PathStep& step : steps) {
+    if (!step.has_pose()) {
+      last = nullptr;
+      continue;
+    }
+    if (last == nullptr) {
+      since_s = step.t_s;
+    } else {
+      // Between two frames the path is straight.
+      const PathStep& now = path[static_cast<std::size_t>(&step - steps.data())];
+      const PathStep& before = path[static_cast<std::size_t>(last - steps.data())];
+      const double gap_s = step.t_s - last->t_s, kept = std::exp(-gap_s / tau_s);
+      const Eigen::Vector3d speed = (now.world_from_cam.translation - before.world_from_cam.translation) / gap_s;
+      const Eigen::Vector3d behind = last->world_from_cam.translation - before.world_from_cam.translation;
+      step.world_from_cam.translation = now.world_from_cam.translation + kept * behind - (1.0 - kept) * tau_s * speed;
+    }
+    last = &step;
+  }
+  for (PathStep& step : steps)
+    if (step.t_s < since_s + forgotten * tau_s) step.event = FrameEvent::waiting;
+  return steps;
+}
+
 namespace {
 
 constexpr double rejected_beyond = 4.0;  // of their robust σ
@@ -139,35 +167,6 @@ double clock_of(std::span<const DepthReading> readings, std::span<const PathStep
   const double curve = misfits[best - 1] - 2.0 * misfits[best] + misfits[best + 1];
   const double share = curve > 0.0 ? 0.5 * (misfits[best - 1] - misfits[best + 1]) / curve : 0.0;
   return step_s * (static_cast<double>(best) - most + std::clamp(share, -1.0, 1.0));
-}
-
-/// What a sensor whose filter has a time constant is shown of a path; nothing before it has forgotten its first value.
-std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s) {
-  constexpr double forgotten = 3.0;  // time constants
-  std::vector<PathStep> steps(path.begin(), path.end());
-  const PathStep* last = nullptr;
-  double since_s = 0.0;
-  for (PathStep& step : steps) {
-    if (!step.has_pose()) {
-      last = nullptr;
-      continue;
-    }
-    if (last == nullptr) {
-      since_s = step.t_s;
-    } else {
-      // Between two frames the path is straight.
-      const PathStep& now = path[static_cast<std::size_t>(&step - steps.data())];
-      const PathStep& before = path[static_cast<std::size_t>(last - steps.data())];
-      const double gap_s = step.t_s - last->t_s, kept = std::exp(-gap_s / tau_s);
-      const Eigen::Vector3d speed = (now.world_from_cam.translation - before.world_from_cam.translation) / gap_s;
-      const Eigen::Vector3d behind = last->world_from_cam.translation - before.world_from_cam.translation;
-      step.world_from_cam.translation = now.world_from_cam.translation + kept * behind - (1.0 - kept) * tau_s * speed;
-    }
-    last = &step;
-  }
-  for (PathStep& step : steps)
-    if (step.t_s < since_s + forgotten * tau_s) step.event = FrameEvent::waiting;
-  return steps;
 }
 
 /// Time constant and clock of a sensor.

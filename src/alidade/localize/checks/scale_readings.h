@@ -20,7 +20,7 @@ struct ReadScale {
   std::size_t num_used = 0, num_rejected = 0;
   double late_s = 0.0;    ///< The readings' clock less the path's, where it is off.
   double offset_m = 0.0;  ///< By which a rangefinder reads too much, where it does.
-  double lag_s = 0.0;     ///< Time constant of a depth sensor's filter, where it has one.
+  double lag_s = 0.0;     ///< Time constant of the filter of a depth sensor or odometry, where it has one.
 };
 
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
@@ -32,6 +32,10 @@ struct ReadScale {
 /// Mean square of what is alike in neighbours of what is left over of readings, in order of time: without half the mean
 /// squared step between two, in the unit of `left`, squared. No number of readings averages that.
 [[nodiscard]] double persistent_square(std::span<const Eigen::Vector3d> left);
+
+/// What a sensor whose filter of first order has a time constant is shown of a path; nothing before it has forgotten
+/// its first value.
+[[nodiscard]] std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s);
 
 /// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of
 /// what is left over, whose neighbours in time are alike, and `sigma_rel`, which all share. Readings far from all
@@ -50,8 +54,8 @@ struct ReadScale {
 /// The straight ways between two positions, by odometry over by the path, of a twentieth of the whole way each: their
 /// mean, without those far from all others (wheels slip), with their scatter as σ, `sigma_rel`, which all share, and
 /// what is persistently left over, beyond the path's σ, of a similarity of each fifth of the way: slipping lengthens
-/// all ways, a lag, and a plane in which the camera does not stay, shorten them. A clock that is up to a second off is
-/// found by the same. None: too few readings, hardly a way, or readings that do not fit the path.
+/// all ways, a plane in which the camera does not stay shortens them. A clock that is up to a second off, and a filter,
+/// are found by the same. None: too few readings, hardly a way, or readings that do not fit the path.
 [[nodiscard]] std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> readings, double sigma_rel,
                                                          std::span<const PathStep> path);
 

@@ -79,14 +79,14 @@ Drawn drawn_of(int num, const ScaleOf& scale_of) {
 
 // ---- odometry
 
-enum class WheelFault { right, slipping, filtered, in_a_plane, late };
+enum class WheelFault { right, slipping, filtered, sampled, averaged, in_a_plane, late };
 
 std::vector<OdometryReading> odometry(const Swaying& swaying, WheelFault fault, std::uint64_t seed) {
   Draws draws(seed + 1000);
   std::vector<OdometryReading> readings;
   const Eigen::Quaterniond other = exp_so3(Eigen::Vector3d(0.3, -0.2, 1.1));
   const double common = 1.0 + 0.01 * draws.normal(), lag_s = 0.4, fine_s = 0.005;
-  Eigen::Vector3d slipped = swaying.at(0.0), filtered = slipped;
+  Eigen::Vector3d slipped = swaying.at(0.0), filtered = slipped, of_samples = slipped;
   for (int i = 0; i < num_readings; ++i) {
     const double t_s = every_s * i;
     const Eigen::Vector3d place = swaying.at(t_s);
@@ -94,9 +94,15 @@ std::vector<OdometryReading> odometry(const Swaying& swaying, WheelFault fault, 
       slipped += (draws.uniform(0.0, 1.0) < 0.2 ? 1.5 : 1.0) * (place - swaying.at(t_s - every_s));
       for (double s = t_s - every_s; s < t_s - 1e-9; s += fine_s)
         filtered += fine_s / lag_s * (swaying.at(s) - filtered);
+      of_samples += every_s / lag_s * (place - of_samples);
     }
+    Eigen::Vector3d average = Eigen::Vector3d::Zero();
+    constexpr int num = 16;  // of the last 0.8 s
+    for (int k = 0; k < num; ++k) average += swaying.at(std::max(0.0, t_s - 2.0 * lag_s * k / num)) / num;
     Eigen::Vector3d read = common * (fault == WheelFault::slipping   ? slipped
                                      : fault == WheelFault::filtered ? filtered
+                                     : fault == WheelFault::sampled  ? of_samples
+                                     : fault == WheelFault::averaged ? average
                                                                      : place);
     if (fault == WheelFault::in_a_plane) read.y() = 0.0;
     if (fault != WheelFault::in_a_plane) read = other * read;
@@ -116,6 +122,7 @@ TEST(SensorFaults, OdometryAsItShouldBeGivesItsScale) {
   const Drawn right = drawn_odometry(WheelFault::right, 100);
   EXPECT_EQ(right.given, 100);
   EXPECT_EQ(right.clocks, 0);
+  EXPECT_EQ(right.filters, 0);
   EXPECT_LE(right.beyond_3_sigma, 2);
   EXPECT_LT(right.largest_sigma, 0.03);
 }
@@ -126,9 +133,21 @@ TEST(SensorFaults, OdometryThatDoesNotFitThePathIsLessSure) {
     const Drawn wrong = drawn_odometry(fault, 40);
     EXPECT_EQ(wrong.beyond_5_sigma, 0) << static_cast<int>(fault) << " worst " << wrong.worst;
   }
-  // A filter shortens them, too, and is named as a late clock.
-  const Drawn filtered = drawn_odometry(WheelFault::filtered, 40);
-  EXPECT_EQ(filtered.silent, 0) << " worst " << filtered.worst;
+}
+
+/// A filter shortens all ways, and looks like a late clock: with that corrected, as advised, the path was 4 to 34 % too
+/// short.
+TEST(SensorFaults, FilteredOdometryIsNoLateClock) {
+  for (const WheelFault fault : {WheelFault::filtered, WheelFault::sampled}) {
+    const Drawn filtered = drawn_odometry(fault, 40);
+    EXPECT_EQ(filtered.beyond_5_sigma, 0) << static_cast<int>(fault) << " worst " << filtered.worst;
+    EXPECT_GE(filtered.filters, 36) << static_cast<int>(fault);
+  }
+  // One of another kind looks like a filter that is late as well.
+  const Drawn averaged = drawn_odometry(WheelFault::averaged, 40);
+  EXPECT_EQ(averaged.beyond_5_sigma, 0) << " worst " << averaged.worst;
+  for (const WheelFault fault : {WheelFault::right, WheelFault::late, WheelFault::slipping, WheelFault::in_a_plane})
+    EXPECT_LE(drawn_odometry(fault, 40).filters, 1) << static_cast<int>(fault);
 }
 
 TEST(SensorFaults, AClockOfOdometryIsFound) {

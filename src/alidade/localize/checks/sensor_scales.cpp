@@ -139,6 +139,105 @@ double clock_of(std::span<const OdometryReading> readings, std::span<const PathS
   return step_s * (static_cast<double>(best) - most + std::clamp(share, -1.0, 1.0));
 }
 
+/// The straight ways, as logarithms of odometry's over the path's, without those far from all others.
+struct Ways {
+  double mean = 0.0, sigma = 0.0;
+  std::size_t num_given = 0, num_used = 0;
+};
+std::optional<Ways> ways_of(std::span<const Place> places) {
+  constexpr double num_ways = 20.0;
+  constexpr std::size_t enough = 10;
+  if (places.size() < enough || !(places.back().way_m > 0.0)) return std::nullopt;
+  std::vector<double> logs;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    if (places[i].way_m - places[begin].way_m < places.back().way_m / num_ways) continue;
+    const double by_path = (places[i].of_path - places[begin].of_path).norm();
+    const double by_vehicle = (places[i].of_vehicle - places[begin].of_vehicle).norm();
+    begin = i;
+    if (by_path > 0.0 && by_vehicle > 0.0) logs.push_back(std::log(by_vehicle / by_path));
+  }
+  if (logs.size() < enough) return std::nullopt;
+  Ways ways{.num_given = logs.size()};
+  constexpr double rejected_beyond = 4.0;  // of their robust σ
+  const double centre = median_of(logs);
+  std::vector<double> sizes;
+  for (const double log : logs) sizes.push_back(std::abs(log - centre));
+  const double limit = rejected_beyond * normal_from_mad * median_of(std::move(sizes)) + 1e-9;
+  std::erase_if(logs, [&](double log) { return std::abs(log - centre) > limit; });
+  double sum = 0.0, squares = 0.0;
+  for (const double log : logs) sum += log;
+  const double num = static_cast<double>(logs.size());
+  ways.mean = sum / num;
+  for (const double log : logs) squares += (log - ways.mean) * (log - ways.mean);
+  ways.sigma = std::sqrt(squares / (num * (num - 1.0)));
+  ways.num_used = logs.size();
+  return ways;
+}
+
+/// A time constant and a clock of odometry, how the path as it shows it fits, and its ways.
+struct Followed {
+  double tau_s = 0.0, late_s = 0.0;
+  WayFit fit;
+  Ways ways;
+  std::vector<Place> places;
+};
+
+std::optional<Followed> followed(std::span<const OdometryReading> readings, double tau_s, double late_s,
+                                 std::span<const PathStep> shown) {
+  Followed one{.tau_s = tau_s, .late_s = late_s, .places = places_of(readings, late_s, shown)};
+  const auto ways = ways_of(one.places);
+  if (!ways) return std::nullopt;
+  one.ways = *ways;
+  one.fit = way_fit(one.places);
+  return std::isfinite(one.fit.misfit_m2) ? std::optional(std::move(one)) : std::nullopt;
+}
+
+/// Filters, and clocks beside them: a filter delays the way by its time constant, as a late clock does, and rounds its
+/// turns off, as no clock does. One that is not of first order is like one with a delay; one of samples, whose newest
+/// counts at once, is like one that is early by half of the time between two. Nothing is looked for where
+/// the clock is right and neighbours err by themselves.
+std::vector<Followed> filters_of(std::span<const OdometryReading> readings, const Followed& clock,
+                                 std::span<const PathStep> path) {
+  constexpr double first_s = 0.05, last_s = 1.5, ratio = 1.15, step_s = 0.05, alike = 3.0;
+  constexpr int most = 6;
+  std::vector<Followed> filters;
+  const double every_s =
+      (readings.back().t_s - readings.front().t_s) / static_cast<double>(std::max<std::size_t>(readings.size() - 1, 1));
+  const double earliest_s = -std::min(0.5 * every_s, most * step_s);
+  const auto num = static_cast<double>(clock.places.size());
+  if (clock.late_s == 0.0 && num < alike * clock.fit.num_independent) return filters;
+  for (double tau_s = first_s; tau_s < last_s; tau_s *= ratio) {
+    const std::vector<PathStep> shown = filtered(path, tau_s);
+    for (int k = 0; k <= most; ++k)
+      if (auto one = followed(readings, tau_s, earliest_s + k * step_s, shown)) filters.push_back(*std::move(one));
+  }
+  return filters;
+}
+
+/// What odometry says with a clock alone, or with a filter where that explains clearly more; each filter counts by its
+/// likelihood, and their scatter is in σ.
+Followed averaged(Followed clock, const std::vector<Followed>& filters) {
+  constexpr double clear = 12.0;  // of χ², 3.5σ
+  if (filters.empty()) return clock;
+  const Followed& best =
+      *std::ranges::min_element(filters, {}, [](const Followed& each) { return each.fit.misfit_m2; });
+  const double least = std::min(best.fit.misfit_m2, clock.fit.misfit_m2), num = best.fit.num_independent;
+  const auto chi2_of = [&](const Followed& each) { return num * (each.fit.misfit_m2 / least - 1.0); };
+  double weights = 0.0, sum = 0.0, squares = 0.0;
+  const auto add = [&](const Followed& each) {
+    const double weight = std::exp(-0.5 * chi2_of(each)), log = each.ways.mean;
+    weights += weight, sum += weight * log, squares += weight * log * log;
+  };
+  for (const Followed& each : filters) add(each);
+  add(clock);
+  Followed chosen = chi2_of(clock) > clear ? best : std::move(clock);
+  chosen.ways.mean = sum / weights;
+  chosen.ways.sigma =
+      std::hypot(chosen.ways.sigma, std::sqrt(std::max(squares / weights - chosen.ways.mean * chosen.ways.mean, 0.0)));
+  return chosen;
+}
+
 /// Of the path, in its unit: differences of the mean rates of seconds one after the other, which noise hardly enters.
 double rms_acceleration(std::span<const PathStep> path) {
   if (path.empty()) return 0.0;
@@ -161,38 +260,20 @@ double rms_acceleration(std::span<const PathStep> path) {
 
 std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> readings, double sigma_rel,
                                            std::span<const PathStep> path) {
-  constexpr double num_ways = 20.0;
-  constexpr std::size_t enough = 10;
-  const double late_s = clock_of(readings, path);
-  const std::vector<Place> places = places_of(readings, late_s, path);
-  if (places.size() < enough || !(places.back().way_m > 0.0)) return std::nullopt;
-  std::vector<double> logs;
-  std::size_t begin = 0;
-  for (std::size_t i = 1; i < places.size(); ++i) {
-    if (places[i].way_m - places[begin].way_m < places.back().way_m / num_ways) continue;
-    const double by_path = (places[i].of_path - places[begin].of_path).norm();
-    const double by_vehicle = (places[i].of_vehicle - places[begin].of_vehicle).norm();
-    begin = i;
-    if (by_path > 0.0 && by_vehicle > 0.0) logs.push_back(std::log(by_vehicle / by_path));
-  }
-  if (logs.size() < enough) return std::nullopt;
-  const std::size_t num_given = logs.size();
-  constexpr double rejected_beyond = 4.0;  // of their robust σ
-  const double centre = median_of(logs);
-  std::vector<double> sizes;
-  for (const double log : logs) sizes.push_back(std::abs(log - centre));
-  const double limit = rejected_beyond * normal_from_mad * median_of(std::move(sizes)) + 1e-9;
-  std::erase_if(logs, [&](double log) { return std::abs(log - centre) > limit; });
-  double sum = 0.0, squares = 0.0;
-  for (const double log : logs) sum += log;
-  const double num = static_cast<double>(logs.size()), mean = sum / num;
-  for (const double log : logs) squares += (log - mean) * (log - mean);
-  const double of_ways = std::sqrt(squares / (num * (num - 1.0)));
+  auto clock = followed(readings, 0.0, clock_of(readings, path), path);
+  if (!clock) return std::nullopt;
+  const std::vector<Followed> filters = filters_of(readings, *clock, path);
+  const Followed found = averaged(*std::move(clock), filters);
   const bool is_in_plane = std::ranges::all_of(
       readings, [&](const OdometryReading& each) { return each.position_m.z() == readings.front().position_m.z(); });
-  const double lost = is_in_plane ? out_of_plane(places) : 0.0;
-  const double sigma = std::hypot(std::hypot(of_ways, way_fit(places).persistent, sigma_rel), lost);
-  ReadScale read{std::exp(mean), sigma, logs.size(), num_given - logs.size(), late_s};
+  const double lost = is_in_plane ? out_of_plane(found.places) : 0.0;
+  ReadScale read{std::exp(found.ways.mean),
+                 std::hypot(std::hypot(found.ways.sigma, found.fit.persistent, sigma_rel), lost),
+                 found.ways.num_used,
+                 found.ways.num_given - found.ways.num_used,
+                 found.late_s,
+                 0.0,
+                 found.tau_s};
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }

@@ -139,14 +139,16 @@ void append_matrix_lines(const HeadProjection& head, int number, std::vector<std
     lines.push_back(fmt::format("  {:14.6f} {:14.6f} {:14.6f} {:14.6f}", M(i, 0), M(i, 1), M(i, 2), M(i, 3)));
 }
 
-std::vector<double> numbers_of(const Eigen::VectorXd& vector) { return {vector.data(), vector.data() + vector.size()}; }
+std::vector<double> components_of(const Eigen::VectorXd& vector) {
+  return {vector.data(), vector.data() + vector.size()};
+}
 
 /// One head's part of the document, and its lines.
 JsonValue head_value(const HeadProjection& head, bool has_point, std::vector<std::string>& lines) {
   JsonValue value;
   value["id"] = head.id;
   value["M"] = rows_of(head.M);
-  value["cam_centre_in_world_m"] = numbers_of(head.cam_centre_in_world);
+  value["cam_centre_in_world_m"] = components_of(head.cam_centre_in_world);
   if (!has_point) return value;
   if (!head.pixel) {
     lines.push_back("  the point is not in the camera's field of view");
@@ -154,7 +156,7 @@ JsonValue head_value(const HeadProjection& head, bool has_point, std::vector<std
   }
   const Eigen::Vector2d& px = head.pixel->px;
   const Eigen::Matrix2d& cov = head.pixel->cov;
-  value["px"] = numbers_of(px);
+  value["px"] = components_of(px);
   value["sigma_px"] = std::vector<double>{std::sqrt(cov(0, 0)), std::sqrt(cov(1, 1))};
   value["cov_px2"] = std::vector<double>{cov(0, 0), cov(0, 1), cov(1, 1)};
   lines.push_back(fmt::format("  u {:.3f} ± {:.2g}  v {:.3f} ± {:.2g} px   (3σ)", px.x(), 3.0 * std::sqrt(cov(0, 0)),
@@ -166,8 +168,8 @@ void fill_point(const RigProjection& projection, JobOutcome& outcome) {
   if (!projection.point_cov) return;
   const Eigen::Matrix3d& cov = *projection.point_cov;
   const Eigen::Vector3d sigma_m = cov.diagonal().cwiseSqrt();
-  outcome.document.estimate["point_in_world_m"] = numbers_of(*projection.point_in_world);
-  outcome.document.stddev["point_in_world_m"] = numbers_of(sigma_m);
+  outcome.document.estimate["point_in_world_m"] = components_of(*projection.point_in_world);
+  outcome.document.stddev["point_in_world_m"] = components_of(sigma_m);
   outcome.document.estimate["point_cov_m2"] = rows_of(cov);
   outcome.lines.push_back(fmt::format("the heads determine this point to ± ({:.2g}, {:.2g}, {:.2g}) mm   (3σ)",
                                       3e3 * sigma_m.x(), 3e3 * sigma_m.y(), 3e3 * sigma_m.z()));

@@ -31,7 +31,9 @@ TEST(Soap, Base64) {  // RFC 4648, 10
 TEST(Soap, TimesAndTokens) {
   EXPECT_EQ(utc_text(1284623445.9), "2010-09-16T07:50:45Z");
   EXPECT_EQ(utc_seconds("2010-09-16T07:50:45Z"), 1284623445.0);
-  EXPECT_TRUE(std::isnan(utc_seconds("yesterday")));
+  EXPECT_DOUBLE_EQ(utc_seconds("2010-09-16T07:50:45.25"), 1284623445.25);  // as FITS writes it
+  for (const char* none : {"", "yesterday", "2010-13-16T07:50:45Z", "2010-02-30T07:50:45Z"})
+    EXPECT_TRUE(std::isnan(utc_seconds(none))) << none;
   const UsernameToken one = username_token("me", "secret", 1284623445.0),
                       two = username_token("me", "secret", 1284623445.0);
   EXPECT_NE(one.nonce, two.nonce);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <boost/uuid/detail/sha1.hpp>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -85,14 +86,15 @@ std::string utc_text(double unix_s) {
 }
 
 double utc_seconds(const std::string& text) {
-  std::tm parts{};
-  double seconds = 0.0;
-  if (std::sscanf(text.c_str(), "%4d-%2d-%2dT%2d:%2d:%lf", &parts.tm_year, &parts.tm_mon, &parts.tm_mday,
-                  &parts.tm_hour, &parts.tm_min, &seconds) != 6)
+  int year = 0, hour = 0, minute = 0;
+  unsigned month = 0, day = 0;
+  double second = 0.0;
+  if (std::sscanf(text.c_str(), "%4d-%2u-%2uT%2d:%2d:%lf", &year, &month, &day, &hour, &minute, &second) != 6)
     return std::numeric_limits<double>::quiet_NaN();
-  parts.tm_year -= 1900;
-  parts.tm_mon -= 1;
-  return static_cast<double>(::timegm(&parts)) + seconds;
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(month), std::chrono::day(day)};
+  if (!date.ok()) return std::numeric_limits<double>::quiet_NaN();
+  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+  return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second;
 }
 
 std::string password_digest(std::string_view nonce, std::string_view created, std::string_view password) {

@@ -22,7 +22,7 @@ struct UsernameToken {
 [[nodiscard]] std::string base64_text(std::string_view bytes);
 /// Characters that are none of base64 are skipped.
 [[nodiscard]] std::string base64_bytes(std::string_view text);
-/// 2026-01-31T12:00:00Z of seconds since 1970, and back; NaN of what is no such time.
+/// 2026-01-31T12:00:00Z of seconds since 1970, and back, with or without fractions and Z; NaN of what is no such time.
 [[nodiscard]] std::string utc_text(double unix_s);
 [[nodiscard]] double utc_seconds(const std::string& text);
 

@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <map>
 #include <opencv2/core.hpp>
 
 #include "alidade/files/files.h"
+#include "alidade/heads/protocols/soap.h"
 
 namespace alidade {
 namespace {
@@ -52,19 +51,6 @@ double number_of(const std::map<std::string, std::string>& cards, const std::str
   char* end = nullptr;
   const double value = std::strtod(found->second.c_str(), &end);
   return end == found->second.c_str() ? otherwise : value;
-}
-
-/// "2026-11-24T16:15:36.446", UTC; NaN of what is none.
-double seconds_of(const std::string& text) {
-  int year = 0, hour = 0, minute = 0;
-  unsigned month = 0, day = 0;
-  double second = 0.0;
-  if (std::sscanf(text.c_str(), "%d-%u-%uT%d:%d:%lf", &year, &month, &day, &hour, &minute, &second) != 6)
-    return std::numeric_limits<double>::quiet_NaN();
-  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(month), std::chrono::day(day)};
-  if (!date.ok()) return std::numeric_limits<double>::quiet_NaN();
-  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-  return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second;
 }
 
 /// Numbers are stored with their highest byte first.
@@ -117,7 +103,7 @@ FitsImage read_fits(std::string_view bytes, const std::string& where) {
     at += a_pixel;
   }
   const auto date = cards.find("DATE-OBS");
-  image.begin_s = seconds_of(date == cards.end() ? "" : date->second);
+  image.begin_s = utc_seconds(date == cards.end() ? "" : date->second);
   image.exposure_s = number_of(cards, "EXPTIME", std::numeric_limits<double>::quiet_NaN());
   return image;
 }

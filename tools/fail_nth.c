@@ -1,12 +1,14 @@
 // A library that lets the n-th call of a kind fail, from main() on, for tools/faults.py:
 //   LD_PRELOAD=fail_nth.so FAIL_CALL=write FAIL_NTH=3 FAIL_ERRNO=28 FAIL_LAST=1 FAIL_LOG=/tmp/log alidade …
 // FAIL_LAST=1: every call after it fails as well (a full disk); else only that one. FAIL_LOG: how often it was called,
-// and whether it failed, written as the process ends. FAIL_TRACE=/tmp/trace: from where the failed call came. Kinds: open, write, rename, mkdir, sync, mmap, malloc.
+// and whether it failed, written as the process ends. FAIL_TRACE=/tmp/trace: from where the failed call came. FAIL_KILL=1: instead of failing,
+// the call kills the process. Kinds: open, write, rename, mkdir, sync, mmap, malloc.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <execinfo.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -30,6 +32,7 @@ static int fails(const char* of) {
   if (!in_main || strcmp(kind, of) != 0) return 0;
   const long call = atomic_fetch_add(&calls, 1) + 1;
   if (nth == 0 || (goes_on ? call < nth : call != nth)) return 0;
+  if (getenv("FAIL_KILL") != NULL) kill(getpid(), SIGKILL);
   atomic_store(&failed, 1);
   const char* const trace = getenv("FAIL_TRACE");
   if (trace != NULL) {

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Faults of the machine under every command that writes: tools/faults.py ALIDADE [--short] [--seed N] [--commands a,b]
-[--campaigns calls,kill,together,pipe]. What must hold after each fault: it is answered by exit code 1 or 3 and one line (or nothing was
-lost by it: 0), within seconds, and the folder of results has the whole old result or the whole new one, with nothing beside it."""
+[--campaigns calls,kill,together,pipe] [--kinds open,malloc] [--most N]. What must hold after each fault: it is answered by exit code 1 or 3
+and one line (or nothing was lost by it: 0), within seconds, and the folder of results has the whole old result or the whole new one, with
+nothing beside it."""
 import argparse
 import collections
 import errno
@@ -35,9 +36,10 @@ COMMANDS = {
     "identify": "identify {s}/servo/log.csv",
     "localize": "localize {s}/underwater/sights.csv --camera {s}/underwater/camera.yaml --target {s}/underwater/target.yaml",
 }
-KINDS = {  # call: errno of its failure, and whether all calls after it fail as well
-    "open": (errno.EMFILE, False), "write": (errno.ENOSPC, True), "rename": (errno.EACCES, False),
-    "mkdir": (errno.EROFS, False), "sync": (errno.EIO, False), "mmap": (errno.ENOMEM, False), "malloc": (errno.ENOMEM, False),
+KINDS = {  # the call, errno of its failure, and whether all calls after it fail as well
+    "open": ("open", errno.EMFILE, False), "write": ("write", errno.ENOSPC, True), "rename": ("rename", errno.EACCES, False),
+    "renames": ("rename", errno.EACCES, True), "mkdir": ("mkdir", errno.EROFS, False), "sync": ("sync", errno.EIO, False),
+    "mmap": ("mmap", errno.ENOMEM, False), "malloc": ("malloc", errno.ENOMEM, False),
 }
 HIDDEN = ".alidade-"  # what a killed process leaves, until the next run clears it away
 VOLATILE = ("result.json", "report.html")  # have the time in them
@@ -67,9 +69,7 @@ class Trial:
         if self.finished:
             self.old_content = contents(self.out)
             self.out.rename(self.old)
-            begun = time.monotonic()
-            self.run()
-            self.seconds = time.monotonic() - begun
+            self.seconds = min(self.seconds_of_a_run() for _ in range(5))  # of a busy machine's runs the least: others end before the kill
             self.new_content = contents(self.out)
             for path in self.base.iterdir():
                 if path not in (self.old,):
@@ -81,6 +81,11 @@ class Trial:
     def run(self, seed=1, **environment):
         return subprocess.run(self.line(seed), cwd=self.base, capture_output=True, text=True, errors="replace", timeout=60,
                               env={**os.environ, **environment})
+
+    def seconds_of_a_run(self):
+        begun = time.monotonic()
+        self.run()
+        return time.monotonic() - begun
 
     def begin(self, with_old):
         shutil.rmtree(self.out, ignore_errors=True)
@@ -108,17 +113,28 @@ class Trial:
 
 
 def chosen_calls(count, most, generator):
-    if count <= most:
+    if most == 0 or count <= most:
         return list(range(1, count + 1))
     return sorted(generator.sample(range(1, count + 1), most))
 
 
-def fail_calls(trial, shim, generator, most):
+def check_set_aside(trial, what, code):
+    """An exchange that could not be undone: every older file is still somewhere, and the next run finds its way."""
+    found = contents(trial.out)
+    lost = [name for name, content in trial.old_content.items()
+            if not any((f"/{there}").endswith(f"/{name}") and there_content == content for there, there_content in found.items())]
+    if code != 3 or lost or "result.json" in found:
+        trial.problems.append(f"{trial.name}: {what}: exit {code}, lost: {lost}")
+    check_next_run(trial, what)
+
+
+def fail_calls(trial, shim, generator, kinds, most):
     """Every n-th call of each kind fails, or a sample of them."""
     log = trial.folder / "log"
     done = collections.Counter()
-    for kind, (number, goes_on) in KINDS.items():
-        faults = {"LD_PRELOAD": str(shim), "FAIL_CALL": kind, "FAIL_ERRNO": str(number), "FAIL_LOG": str(log)}
+    for kind in kinds:
+        call, number, goes_on = KINDS[kind]
+        faults = {"LD_PRELOAD": str(shim), "FAIL_CALL": call, "FAIL_ERRNO": str(number), "FAIL_LOG": str(log)}
         if goes_on:
             faults["FAIL_LAST"] = "1"
         trial.begin(False)
@@ -127,34 +143,82 @@ def fail_calls(trial, shim, generator, most):
         if kind == "sync" and count < len(trial.new_content):  # a power cut would lose what the system has not written yet
             trial.problems.append(f"{trial.name}: {count} calls of fsync for {len(trial.new_content)} files")
         for nth in chosen_calls(count, most, generator):
-            with_old = nth % 2 == 0
-            trial.begin(with_old)
+            trial.begin(kind == "renames" or nth % 2 == 0)
             try:
                 ended = trial.run(**faults, FAIL_NTH=str(nth))
-                trial.check(f"{trial.name}: {kind} {nth} of {count} fails", ended.returncode, ended.stderr, ended.stdout)
+                if kind == "renames" and contents(trial.out) != trial.old_content:  # nothing can be undone either
+                    check_set_aside(trial, f"rename {nth} of {count} and all after it fail", ended.returncode)
+                else:
+                    trial.check(f"{trial.name}: {kind} {nth} of {count} fails", ended.returncode, ended.stderr, ended.stdout)
             except subprocess.TimeoutExpired:
                 trial.problems.append(f"{trial.name}: {kind} {nth} of {count} fails: hangs")
             done[kind] += 1
     return done
 
 
+def check_killed(trial, what):
+    """Old or new and whole; in the middle of an exchange there is no result.json: nobody takes the rest for a result."""
+    found = contents(trial.out, with_hidden=False)
+    if found is not None and found not in (trial.old_content, trial.new_content) and "result.json" in found:
+        trial.problems.append(f"{trial.name}: {what}: the folder is neither old nor new")
+
+
+def check_next_run(trial, what):
+    """The run after a kill, left alone, works and clears away what was left."""
+    ended = trial.run()
+    trial.check(f"{trial.name}: after {what}", ended.returncode, ended.stderr)
+    if contents(trial.out) != trial.new_content:
+        trial.problems.append(f"{trial.name}: after {what}: not the new result")
+
+
 def kill(trial, generator, times):
-    """kill -9 at random instants; then a run that is left alone must work."""
+    """kill -9 at random instants; then a run that is left alone must work. Those that came too late are not counted."""
+    done = 0
     for _ in range(times):
         trial.begin(generator.random() < 0.5)
         started = subprocess.Popen(trial.line(), cwd=trial.base, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(generator.random() * 1.1 * trial.seconds)
         started.send_signal(signal.SIGKILL)
-        started.wait()
-        found = contents(trial.out, with_hidden=False)
-        # In the middle of an exchange there is no result.json: nobody takes the rest for a result.
-        if found is not None and found not in (trial.old_content, trial.new_content) and "result.json" in found:
-            trial.problems.append(f"{trial.name}: killed: the folder is neither old nor new")
-    ended = trial.run()
-    trial.check(f"{trial.name}: after kills", ended.returncode, ended.stderr)
-    if contents(trial.out) != trial.new_content:
-        trial.problems.append(f"{trial.name}: after kills: not the new result")
-    return {"kill": times}
+        done += started.wait() == -signal.SIGKILL
+        check_killed(trial, "killed")
+    check_next_run(trial, "kills")
+    return {"kill": done}
+
+
+def kill_at_calls(trial, shim, generator, most):
+    """kill -9 just before each call that changes the disk: random instants seldom meet these. The next run must work each time."""
+    log, done = trial.folder / "log", 0
+    for kind in ("open", "write", "rename", "mkdir", "sync"):
+        environment = {"LD_PRELOAD": str(shim), "FAIL_CALL": kind, "FAIL_LOG": str(log)}
+        trial.begin(True)
+        trial.run(**environment)
+        for nth in chosen_calls(int(log.read_text().split()[0]), most, generator):
+            what = f"kill before {kind} {nth}"
+            for with_old in (False, True):
+                trial.begin(with_old)
+                if trial.run(**environment, FAIL_NTH=str(nth), FAIL_KILL="1").returncode == -signal.SIGKILL:
+                    check_killed(trial, what)
+                    check_next_run(trial, what)
+                    done += 1
+    return {"kill at a call": done}
+
+
+def kill_twice(trial, shim, most):
+    """The run that finds what a killed one left is killed in turn, before each rename of each."""
+    log, done = trial.folder / "log", 0
+    environment = {"LD_PRELOAD": str(shim), "FAIL_CALL": "rename", "FAIL_LOG": str(log)}
+    trial.begin(True)
+    trial.run(**environment)
+    count = int(log.read_text().split()[0])
+    for first in range(2, min(count, most or count) + 1):
+        for second in range(1, count + 1):
+            trial.begin(True)
+            for nth in (first, second):
+                trial.run(**environment, FAIL_NTH=str(nth), FAIL_KILL="1")
+                check_killed(trial, f"kill before rename {first}, then {second}")
+                done += 1
+            check_next_run(trial, f"kill before rename {first}, then {second}")
+    return {"kill at a call": done}
 
 
 def together(trial, count):
@@ -195,10 +259,16 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--commands", default=",".join(COMMANDS))
     parser.add_argument("--campaigns", default="calls,kill,together,pipe")
+    parser.add_argument("--kinds", default=",".join(KINDS), help="of calls that fail")
+    parser.add_argument("--most", type=int, help="failing calls of a kind, a sample where there are more (200; 0: all); kills (1000)")
     args = parser.parse_args()
     generator = random.Random(args.seed)
     alidade = args.alidade.resolve()
     total, problems = collections.Counter(), []
+
+    def most(usual):
+        return 4 if args.short else usual if args.most is None else args.most
+
     with tempfile.TemporaryDirectory() as made:
         folder = pathlib.Path(made)
         shim = folder / "fail_nth.so"
@@ -217,9 +287,11 @@ def main():
                 problems.append(f"{name}: exit {ended.returncode} without any fault: {ended.stderr.strip()[:200]}")
                 continue
             if "calls" in args.campaigns:
-                total.update(fail_calls(trial, shim, generator, 4 if args.short else 200))
+                total.update(fail_calls(trial, shim, generator, args.kinds.split(","), most(200)))
             if "kill" in args.campaigns:
-                total.update(kill(trial, generator, 4 if args.short else 1000))
+                total.update(kill(trial, generator, most(1000)))
+                total.update(kill_at_calls(trial, shim, generator, 1 if args.short else 0))
+                total.update(kill_twice(trial, shim, 2 if args.short else 0))
             if "together" in args.campaigns:
                 total.update(together(trial, 4 if args.short else 64))
             if "pipe" in args.campaigns:

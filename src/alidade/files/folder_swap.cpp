@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 constexpr const char* hidden_prefix = ".alidade-";
 // Inside the hidden folder. The third name says that all that was older is out of the way.
 constexpr const char *new_files = "new", *older_files = "older", *replaced_files = "replaced";
+constexpr const char* last_name = "last";  // its content: the file that comes last
 
 /// The folder open and locked; not open where another process has it, or the file system knows no locks.
 Descriptor locked(const fs::path& folder) {
@@ -35,14 +36,15 @@ bool stands_at(const fs::path& path) {
   return ::lstat(path.c_str(), &status) == 0;
 }
 
-/// Every file under `from` to the same place under `to`.
-void move_files(const fs::path& from, const fs::path& to) {
+/// Every file under `from` to the same place under `to`, `last` after all others.
+void move_files(const fs::path& from, const fs::path& to, const fs::path& last) {
   std::error_code ignored;
   std::vector<fs::path> names;
   for (const auto& entry : fs::recursive_directory_iterator(from, ignored)) {
     if (!entry.is_directory(ignored) || entry.is_symlink(ignored))
       names.push_back(entry.path().lexically_relative(from));
   }
+  std::partition(names.begin(), names.end(), [&](const fs::path& name) { return name != last; });
   for (const fs::path& name : names) {
     fs::create_directories((to / name).parent_path(), ignored);
     fs::rename(from / name, to / name, ignored);
@@ -54,7 +56,7 @@ bool is_of_swap(const fs::path& hidden) {
   std::error_code ignored;
   const auto is_own = [](const fs::directory_entry& entry) {
     const std::string name = entry.path().filename();
-    return name == new_files || name == older_files || name == replaced_files;
+    return name == new_files || name == older_files || name == replaced_files || name == last_name;
   };
   return std::all_of(fs::directory_iterator(hidden, ignored), fs::directory_iterator(), is_own);
 }
@@ -70,9 +72,23 @@ void clear_remains(const fs::path& folder) {
   for (const fs::path& hidden : remains) {
     const Descriptor lock = locked(hidden);
     if (!lock.is_open() || !is_of_swap(hidden)) continue;
-    if (stands_at(hidden / older_files)) move_files(hidden / older_files, folder);
-    if (stands_at(hidden / replaced_files)) move_files(hidden / new_files, folder);
+    const fs::path last = stands_at(hidden / last_name) ? read_file(hidden / last_name) : "";
+    if (stands_at(hidden / older_files)) move_files(hidden / older_files, folder, last);
+    if (stands_at(hidden / replaced_files)) move_files(hidden / new_files, folder, last);
     fs::remove_all(hidden, ignored);
+  }
+}
+
+/// The content that will be at `place`. Throws InputError, and leaves nothing of it, if it cannot be written.
+void write_waiting(const fs::path& place, const fs::path& waiting, std::string_view content) {
+  Descriptor file(::open(waiting.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666));
+  if (!file.is_open()) fail_on(place, "cannot be written", errno);
+  try {
+    write_all(place, file, content);
+    if (!file.close()) fail_on(place, "cannot be written", errno);
+  } catch (const InputError&) {
+    ::unlink(waiting.c_str());
+    throw;
   }
 }
 
@@ -84,7 +100,9 @@ std::vector<fs::path> unique(std::vector<fs::path> paths) {
 
 }  // namespace
 
-MadeFolders::~MadeFolders() {
+MadeFolders::~MadeFolders() { remove_empty(); }
+
+void MadeFolders::remove_empty() noexcept {
   for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) ::rmdir(folder->c_str());
 }
 
@@ -175,15 +193,7 @@ void FolderSwap::add(const fs::path& name, std::string_view content) {
   if (fs::is_directory(place, error)) throw InputError(place.string() + ": is a folder, not a file");
   fs::create_directories(waiting.parent_path(), error);
   if (error) fail_on(place, "cannot be written", error.value());
-  Descriptor file(::open(waiting.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666));
-  if (!file.is_open()) fail_on(place, "cannot be written", errno);
-  try {
-    write_all(place, file, content);
-    if (!file.close()) fail_on(place, "cannot be written", errno);
-  } catch (const InputError&) {
-    ::unlink(waiting.c_str());
-    throw;
-  }
+  write_waiting(place, waiting, content);
   if (std::find(added_.begin(), added_.end(), name) == added_.end()) added_.push_back(name);
 }
 
@@ -198,13 +208,19 @@ void FolderSwap::move(const fs::path& from, const fs::path& to) {
 }
 
 void FolderSwap::undo() noexcept {
-  for (auto done = moves_.rbegin(); done != moves_.rend(); ++done) ::rename(done->to.c_str(), done->from.c_str());
+  for (auto done = moves_.rbegin(); done != moves_.rend(); ++done) {
+    if (::rename(done->to.c_str(), done->from.c_str()) == 0) continue;
+    made_.remove_empty();  // a folder that was made where the older result has a file
+    // What cannot go back stays in the hidden folder, for the next FolderSwap to move.
+    if (::rename(done->to.c_str(), done->from.c_str()) != 0) hidden_folder_.path.clear();
+  }
   moves_.clear();
 }
 
 /// What is new, with the folders that list it: after it every rename finds whole files, whatever happens to the power.
 void FolderSwap::sync_new() const {
   std::vector<fs::path> files, folders = {hidden_ / new_files, hidden_};
+  if (!added_.empty()) files.push_back(hidden_ / last_name);
   for (const fs::path& name : added_) {
     files.push_back(hidden_ / new_files / name);
     for (fs::path in = name.parent_path(); !in.empty(); in = in.parent_path())
@@ -232,6 +248,7 @@ void FolderSwap::set_aside(const fs::path& name) {
 }
 
 void FolderSwap::commit() {
+  if (!added_.empty()) write_waiting(folder_, hidden_ / last_name, added_.front().string());
   sync_new();
   std::vector<fs::path> going = added_;
   going.insert(going.end(), removed_.begin(), removed_.end());

@@ -19,6 +19,8 @@ class MadeFolders {
   ~MadeFolders();
   /// Makes what is missing of the path. Throws InputError if it cannot be made.
   void make(const std::filesystem::path& folder);
+  /// What was made and is empty goes.
+  void remove_empty() noexcept;
   /// The folders that list what was made.
   [[nodiscard]] std::vector<std::filesystem::path> parents() const;
 

@@ -2,13 +2,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
 
+#include <array>
 #include <csignal>
 #include <map>
 #include <thread>
 
+#include "alidade/files/descriptor.h"
 #include "alidade/testing/process.h"
 
 namespace alidade {
@@ -178,6 +181,73 @@ TEST(FolderSwap, ACommitCutInTwoIsUndoneOrEndedByTheNextOne) {
     { const FolderSwap next(folder.path()); }
     EXPECT_EQ(content_of(folder.path()), num_renames < 3 ? old : made) << num_renames;
   }
+}
+
+/// Names in the order in which they are moved into a folder while `work` runs.
+std::vector<std::string> moved_into(const fs::path& folder, const std::function<void()>& work) {
+  const Descriptor watch(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC));
+  EXPECT_GE(::inotify_add_watch(watch.number(), folder.c_str(), IN_MOVED_TO), 0);
+  work();
+  std::vector<std::string> names;
+  alignas(inotify_event) std::array<char, 65536> buffer{};
+  const ssize_t size = ::read(watch.number(), buffer.data(), buffer.size());
+  for (ssize_t at = 0; at < size;) {
+    const auto* event = reinterpret_cast<const inotify_event*>(buffer.data() + at);
+    names.emplace_back(event->name);
+    at += static_cast<ssize_t>(sizeof(inotify_event) + event->len);
+  }
+  return names;
+}
+
+/// A commit() of twenty files and result.json that was killed: before any new file came, or before any older one went
+/// back.
+void cut_commit_of_many(const fs::path& folder, const std::string& moved) {
+  const fs::path hidden = folder / ".alidade-killed";
+  write_file(hidden / "last", "result.json");
+  for (const std::string in : {"new", moved.c_str()}) {
+    write_file(hidden / in / "result.json", in);
+    for (int i = 0; i < 20; ++i) write_file(hidden / in / std::to_string(i), in);
+  }
+}
+
+TEST(FolderSwap, TheNextOneMovesTheFileThatDescribesTheOthersLastToo) {
+  for (const char* moved :
+       {"older", "replaced"}) {  // a second kill must find no result.json beside files that are not its own
+    const TemporaryFolder folder;
+    cut_commit_of_many(folder.path(), moved);
+    const std::vector<std::string> names = moved_into(folder.path(), [&] { const FolderSwap next(folder.path()); });
+    ASSERT_EQ(names.size(), 21u);
+    EXPECT_EQ(names.back(), "result.json") << moved;
+  }
+}
+
+TEST(FolderSwap, CommitSaysInTheHiddenFolderWhichFileComesLast) {
+  const TemporaryFolder folder;
+  FolderSwap swap(folder.path());
+  swap.add("result.json", "new");
+  swap.add("a", "new");
+  swap.commit();
+  std::string last;
+  for (const auto& entry : fs::directory_iterator(folder.path())) {
+    if (entry.is_directory()) last = read_file(entry.path() / "last");
+  }
+  EXPECT_EQ(last, "result.json");
+}
+
+TEST(FolderSwap, AFileWhoseFolderToBeFailsIsNotLost) {
+  const TemporaryFolder folder;
+  write_file(folder.path() / "result.json", "old");
+  write_file(folder.path() / "a", "old: a file, and in the new result a folder");
+  const Content before = content_of(folder.path());
+  {
+    FolderSwap swap(folder.path());
+    for (const char* name : {"result.json", "in", "a/b/c"}) swap.add(name, "new");
+    swap.remove("a");
+    fs::create_directory(folder.path() / "in");  // in the way, and found after a/b/c has its place
+    EXPECT_NE(fault_of([&] { swap.commit(); }), "");
+    fs::remove(folder.path() / "in");
+  }
+  EXPECT_EQ(content_of(folder.path()), before);
 }
 
 TEST(FolderSwap, WhatAnotherProcessIsWritingIsNotCleared) {

@@ -70,9 +70,12 @@ struct SensorScale {
   double scale = 1.0;      ///< Metres per unit of the path without it: 1 where a target gave correct metres.
   double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
-  bool is_in_time = true;     ///< There are readings within the time span of the path.
-  double late_s = 0.0;        ///< The readings' clock less the camera's, where it is off: corrected.
-  double offset_m = 0.0;      ///< By which a rangefinder's readings are too long, where they are: corrected.
+  bool is_in_time = true;  ///< There are readings within the time span of the path.
+  double late_s = 0.0;     ///< The readings' clock less the camera's, where it is off: corrected.
+  double offset_m = 0.0;   ///< By which a rangefinder's readings are too long, where they are: corrected.
+  double aside_rad = 0.0;  ///< By which a rangefinder's beam points elsewhere than given, where it does: corrected.
+  /// Share of the scale that an offset of 0.1 m of a rangefinder's readings would be, where it would not show; else 0.
+  double hidden_offset_rel = 0.0;
   double lag_s = 0.0;         ///< Time constant of the filter of a depth sensor or odometry, if any: corrected.
   double acceleration = 0.0;  ///< RMS of the camera's by this scale, over the one that is given.
 };

@@ -19,8 +19,9 @@ struct NearPoint {
 };
 
 struct BeamScale {
-  double log_scale = 0.0, roughness = 0.0;  ///< The points off their plane, over the distance.
-  double of_offset = 0.0;                   ///< ∂scale / ∂(length of all readings). [units/m]
+  double log_scale = 0.0, roughness = 0.0;                 ///< The points off their plane, over the distance.
+  double of_offset = 0.0;                                  ///< ∂scale / ∂(length of all readings). [units/m]
+  Eigen::Vector2d of_direction = Eigen::Vector2d::Zero();  ///< ∂scale / ∂(direction of the beam). [units/rad]
 };
 
 /// Metres a unit where the beam hits the plane through the points that are nearest to it. None: too few around it.
@@ -57,7 +58,9 @@ std::optional<BeamScale> scale_at(const Rigid3& world_from_cam, const Beam& beam
   // n·X = c in units; where the beam hits it is s c in metres.
   const double scale = of_hit / to_plane;
   if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
-  return BeamScale{std::log(scale), roughness / middle.norm(), of_beam / to_plane};
+  const Eigen::RowVectorXd of_params = normal.transpose() * J_point_beam(beam, range_m) / to_plane;
+  return BeamScale{std::log(scale), roughness / middle.norm(), of_beam / to_plane,
+                   of_params.segment<2>(beam_direction_param).transpose()};
 }
 
 /// Of the log of the scale by the beam's parameters: the median over the readings, since a moved beam may hit between
@@ -123,66 +126,127 @@ MeanScale mean_of_blocks(std::span<const BeamScale> scales) {
   return {mean, std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0))};
 }
 
-/// All readings too long by one length: scale_i = S + x_i offset, with x_i the more the nearer the surface is.
-struct OffsetFit {
-  double scale = 1.0, offset_m = 0.0;
-  double spread = 0.0;  ///< Standard deviation of x.
+/// Something of the beam that is not as given: scale_i = S + x_i · by, with x of a reading the more, the more that
+/// changes its scale.
+struct BeamFault {
+  Eigen::Index num = 1;  ///< Of its numbers.
+  Eigen::VectorXd (*x_of)(const BeamScale&);
+  double clear, half_clear;  ///< Of T² with nine degrees of freedom: as seldom as 3.5σ and 2σ of a normal distribution.
+};
+/// All readings are too long by one length.
+const BeamFault offset_fault{
+    1, [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_offset).eval(); }, 28.6, 5.4};
+/// The beam points elsewhere.
+const BeamFault direction_fault{2, [](const BeamScale& each) -> Eigen::VectorXd { return each.of_direction; }, 52.3,
+                                10.5};
+
+struct FaultFit {
+  double scale = 1.0, left2 = 0.0;  ///< What is left over, squared.
+  Eigen::VectorXd by, spread;       ///< Standard deviations of x.
 };
 
-std::optional<OffsetFit> offset_fit(std::span<const BeamScale> scales, std::size_t but_begin, std::size_t but_end) {
-  double num = 0.0, sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
+std::optional<FaultFit> fault_fit(const BeamFault& fault, std::span<const BeamScale> scales, std::size_t but_begin,
+                                  std::size_t but_end) {
+  const Eigen::Index size = fault.num + 1;
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(size), row = Eigen::VectorXd::Ones(size);
+  double squares = 0.0;
   for (std::size_t i = 0; i < scales.size(); ++i) {
     if (i >= but_begin && i < but_end) continue;
-    const double x = scales[i].of_offset, y = std::exp(scales[i].log_scale);
-    num += 1.0;
-    sum_x += x;
-    sum_y += y;
-    sum_xx += x * x;
-    sum_xy += x * y;
+    const double y = std::exp(scales[i].log_scale);
+    row.tail(fault.num) = fault.x_of(scales[i]);
+    H += row * row.transpose();
+    g += y * row;
+    squares += y * y;
   }
-  const double variance = sum_xx / num - sum_x * sum_x / (num * num);
-  if (!(variance > 1e-12 * sum_xx / num)) return std::nullopt;
-  const double slope = (sum_xy / num - sum_x * sum_y / (num * num)) / variance;
-  return OffsetFit{(sum_y - slope * sum_x) / num, slope, std::sqrt(variance)};
+  FaultFit fit;
+  const Eigen::VectorXd mean = H.col(0).tail(fault.num) / H(0, 0);
+  const Eigen::VectorXd square = H.diagonal().tail(fault.num) / H(0, 0);
+  fit.spread = (square - mean.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
+  const Ldlt ldlt(H);
+  constexpr double hardly = 1e-10;
+  if (!(ldlt.min_pivot() > hardly * H(0, 0)) || !(fit.spread.minCoeff() > 0.0)) return std::nullopt;
+  const Eigen::VectorXd solution = ldlt.inverse() * g;
+  fit.scale = solution[0];
+  fit.by = solution.tail(fault.num);
+  fit.left2 = std::max(squares - solution.dot(g), 0.0);
+  return fit;
 }
 
-/// σ by the jackknife over blocks of time.
-struct OffsetSigma {
-  double of_log_scale = 0.0, of_offset_m = 0.0;
+/// A fault as estimated: by the jackknife over blocks of time, the surface's shape and what is known of the beam.
+struct FoundFault {
+  FaultFit fit;
+  double sigma_log_scale = 0.0, T2 = 0.0;
+  Eigen::VectorXd sigma_by;
 };
 
-std::optional<OffsetSigma> sigma_of(const OffsetFit& fit, std::span<const BeamScale> scales) {
-  double of_scale = 0.0, of_offset = 0.0;
+/// `of_surface`: relative error of each scale by the surface's shape, which may follow x.
+std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const BeamScale> scales,
+                                      const Eigen::MatrixXd& of_beam, double of_surface) {
+  const auto fit = fault_fit(fault, scales, 0, 0);
+  if (!fit || !(fit->scale > 0.0)) return std::nullopt;
+  FoundFault found{*fit};
+  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(fault.num, fault.num);
+  double of_scale = 0.0;
   for (std::size_t i = 0; i < num_blocks; ++i) {
-    const auto without = offset_fit(scales, i * scales.size() / num_blocks, (i + 1) * scales.size() / num_blocks);
+    const auto without = fault_fit(fault, scales, i * scales.size() / num_blocks, (i + 1) * scales.size() / num_blocks);
     if (!without || !(without->scale > 0.0)) return std::nullopt;
-    of_scale += std::pow(std::log(without->scale / fit.scale), 2);
-    of_offset += std::pow(without->offset_m - fit.offset_m, 2);
+    of_scale += std::pow(std::log(without->scale / fit->scale), 2);
+    cov += (without->by - fit->by) * (without->by - fit->by).transpose();
   }
   const double share = (static_cast<double>(num_blocks) - 1.0) / static_cast<double>(num_blocks);
-  return OffsetSigma{std::sqrt(share * of_scale), std::sqrt(share * of_offset)};
+  cov = share * cov + of_beam;
+  cov.diagonal() += (of_surface * fit->scale * fit->spread.cwiseInverse()).cwiseAbs2();
+  found.sigma_log_scale = std::sqrt(share * of_scale);
+  found.sigma_by = cov.diagonal().cwiseSqrt();
+  found.T2 = fit->by.dot(Ldlt(cov).inverse() * fit->by);
+  return found;
 }
 
-/// Where the distances say that the readings are all too long, that is estimated; where they half say so, its effect is
-/// in σ. `of_surface`: relative error of each scale by the surface's shape, which may follow the distance.
-void add_offset(std::span<const BeamScale> scales, const Beam& beam, double of_surface, ReadScale& read) {
-  const auto fit = offset_fit(scales, 0, 0);
-  if (!fit || !(fit->scale > 0.0)) return;
-  const auto sigma = sigma_of(*fit, scales);
-  if (!sigma) return;
-  const double of_curvature = of_surface * fit->scale / fit->spread;
-  const double of_beam =
-      std::sqrt(std::max(beam.direction_in_cam.dot(beam.cov.topLeftCorner<3, 3>() * beam.direction_in_cam), 0.0));
-  const double z = std::abs(fit->offset_m) / std::hypot(sigma->of_offset_m, of_curvature, of_beam);
-  // t of nine degrees of freedom: as seldom as 3.5σ and 2σ of a normal distribution
-  constexpr double clear = 5.3, half_clear = 2.3;
-  const double change = std::log(fit->scale / read.scale);
-  if (z > clear) {
-    read.scale = fit->scale;
-    read.offset_m = fit->offset_m;
-    read.sigma_rel = std::hypot(read.sigma_rel, sigma->of_log_scale);
-  } else if (z > half_clear) {
-    read.sigma_rel = std::hypot(read.sigma_rel, change);
+/// How much of the scale an offset of the readings would be that is as long as an instrument, measured from its other
+/// end, where no covariance of the beam and not the readings themselves exclude it: a surface's shape, or a distance
+/// that hardly changes, hides it. 0: it would show.
+double hidden_offset(std::span<const BeamScale> scales, const Beam& beam, const std::optional<FoundFault>& offset,
+                     double scale) {
+  constexpr double length_m = 0.1;
+  constexpr double sigmas = 3.3;  // an offset so large is beyond 2σ, that is in doubt, in five of six cases
+  if (beam.cov.diagonal().maxCoeff() > 0.0) return 0.0;
+  if (offset && sigmas * offset->sigma_by[0] < length_m) return 0.0;
+  double of_offset = 0.0;
+  for (const BeamScale& each : scales) of_offset += std::abs(each.of_offset) / static_cast<double>(scales.size());
+  return length_m * of_offset / scale;
+}
+
+/// Where the readings say that they are all too long, or that the beam points elsewhere, that which explains more is
+/// estimated; where they half say so, its effect is in σ.
+void add_faults(std::span<const BeamScale> scales, const Beam& beam, double of_surface, ReadScale& read) {
+  const Eigen::Vector3d along = beam.direction_in_cam;
+  const Eigen::MatrixXd along_beam = Eigen::MatrixXd::Constant(1, 1, along.dot(beam.cov.topLeftCorner<3, 3>() * along)),
+                        of_direction = beam.cov.block<2, 2>(beam_direction_param, beam_direction_param);
+  const auto offset = found_fault(offset_fault, scales, along_beam, of_surface),
+             direction = found_fault(direction_fault, scales, of_direction, of_surface);
+  const bool is_offset = offset && offset->T2 > offset_fault.clear,
+             is_direction = direction && direction->T2 > direction_fault.clear;
+  const bool is_more_direction = is_direction && (!is_offset || direction->fit.left2 < offset->fit.left2);
+  const auto put = [&](const FoundFault& found) {
+    read.scale = found.fit.scale;
+    read.sigma_rel = std::hypot(read.sigma_rel, found.sigma_log_scale);
+  };
+  const double before = read.scale;
+  const auto doubt = [&](const std::optional<FoundFault>& found, const BeamFault& fault) {
+    if (found && found->T2 > fault.half_clear)
+      read.sigma_rel = std::hypot(read.sigma_rel, std::log(found->fit.scale / before));
+  };
+  if (is_more_direction) {
+    put(*direction);
+    read.aside_rad = direction->fit.by.norm();
+  } else if (is_offset) {
+    put(*offset);
+    read.offset_m = offset->fit.by[0];
+  } else {
+    doubt(offset, offset_fault);
+    doubt(direction, direction_fault);
+    read.hidden_offset_rel = hidden_offset(scales, beam, offset, before);
   }
 }
 
@@ -208,7 +272,7 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   // A curved surface is on one side of every plane through its points, by about as much as they are off it.
   const double of_surface = roughness / static_cast<double>(num_given);
   read.sigma_rel = std::hypot(mean.sigma, sigma_by_beam(readings, beam, path, map), of_surface);
-  add_offset(scales, beam, of_surface, read);
+  add_faults(scales, beam, of_surface, read);
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }

@@ -220,7 +220,7 @@ std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, 
   for (const DepthRow& row : rows) squares += row.left * row.left;
   const double worse = std::max(1.0, squares / (static_cast<double>(rows.size()) - 4.0)) * inflation(rows);
   const Eigen::Matrix3d cov = worse * fit->cov.topLeftCorner<3, 3>();
-  ReadScale read{g.norm(), 1.0, rows.size(), num_given - rows.size(), found.late_s, 0.0, found.tau_s};
+  ReadScale read{g.norm(), 1.0, rows.size(), num_given - rows.size(), found.late_s, 0.0, 0.0, 0.0, found.tau_s};
   if (!(read.scale > 0.0)) return std::nullopt;
   const Eigen::Vector3d along = g / read.scale;
   const double variance = along.dot(cov * along), across = cov.trace() - variance;

@@ -18,9 +18,12 @@ struct ReadScale {
   double scale = 1.0;      ///< Metres for each unit of the path.
   double sigma_rel = 1.0;  ///< Its σ over it.
   std::size_t num_used = 0, num_rejected = 0;
-  double late_s = 0.0;    ///< The readings' clock less the path's, where it is off.
-  double offset_m = 0.0;  ///< By which a rangefinder reads too much, where it does.
-  double lag_s = 0.0;     ///< Time constant of the filter of a depth sensor or odometry, where it has one.
+  double late_s = 0.0;     ///< The readings' clock less the path's, where it is off.
+  double offset_m = 0.0;   ///< By which a rangefinder reads too much, where it does.
+  double aside_rad = 0.0;  ///< By which a rangefinder's beam points elsewhere, where it does.
+  /// Share of the scale that 0.1 m too much of every reading would be, where it would not show; else 0.
+  double hidden_offset_rel = 0.0;
+  double lag_s = 0.0;  ///< Time constant of the filter of a depth sensor or odometry, where it has one.
 };
 
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
@@ -46,8 +49,8 @@ struct ReadScale {
 
 /// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
 /// readings near their median, with the scatter of blocks of them as its σ. Where their distances say so, all of them
-/// are too long by one length: then that is estimated, too. None: too few readings with points around them. σ of the
-/// beam is in it; where its file has none, 0.5 % of its scale.
+/// are too long by one length, or where their places say so the beam points elsewhere: then that is estimated, too.
+/// None: too few readings with points around them. σ of the beam is in it; where its file has none, 0.5 % of its scale.
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 

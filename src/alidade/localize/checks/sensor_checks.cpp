@@ -1,6 +1,7 @@
 #include <cmath>
 #include <string>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/localize/checks/judge.h"
 #include "alidade/localize/path/path_doubt.h"
 
@@ -28,6 +29,12 @@ void add_corrected(const SensorScale& sensor, Verdict& verdict) {
                                   " m too " + (sensor.offset_m > 0.0 ? "long" : "short") +
                                   ": corrected; its beam begins elsewhere than --beam says",
                               std::abs(sensor.offset_m), 0.0, "m", "path"});
+  if (sensor.aside_rad > 0.0)
+    verdict.checks.push_back({sensor.sensor + " direction", State::care,
+                              "the beam of the " + sensor.sensor + " points elsewhere than --beam says, by about " +
+                                  text_of(sensor.aside_rad / degree, 2) +
+                                  "°: corrected; calibrate it (alidade rangefinder)",
+                              sensor.aside_rad, 0.0, "rad", "path"});
 }
 
 /// Readings that are not in metres, or of another clock.
@@ -39,6 +46,19 @@ void add_readings(const SensorScale& sensor, Verdict& verdict) {
                                   " times as much as --sigma-a says: are its readings in metres?",
                               sensor.acceleration, fast, "1", "path"});
   add_corrected(sensor, verdict);
+}
+
+/// An error of a rangefinder without covariance that its readings do not exclude.
+void add_hidden(const SensorScale& sensor, Verdict& verdict) {
+  if (!(sensor.hidden_offset_rel > 0.0)) return;
+  verdict.checks.push_back({sensor.sensor + " hidden offset", State::care,
+                            "if all readings of the " + sensor.sensor +
+                                " were 0.1 m too long (from its housing's other end, say) it would not show, and the "
+                                "scale be off by " +
+                                text_of(100.0 * sensor.hidden_offset_rel, 2) +
+                                " %: use a beam with its covariance (alidade rangefinder), or move nearer and farther "
+                                "before a flat wall",
+                            sensor.hidden_offset_rel, 0.0, "1", "path"});
 }
 
 /// Why a sensor's readings do not determine the scale.
@@ -96,6 +116,7 @@ void add_sensors(const Localization& report, Verdict& verdict) {
       continue;
     }
     add_readings(each, verdict);
+    if (report.is_scale_read) add_hidden(each, verdict);
     if (!report.is_scale_read || first) add_agreement(each, report.is_scale_read ? first : nullptr, verdict);
     add_rejected(each, verdict);
     if (first == nullptr) first = &each;

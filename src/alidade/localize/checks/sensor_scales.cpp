@@ -273,6 +273,8 @@ std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> read
                  found.ways.num_given - found.ways.num_used,
                  found.late_s,
                  0.0,
+                 0.0,
+                 0.0,
                  found.tau_s};
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
@@ -292,6 +294,8 @@ void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Lo
                true,
                read->late_s,
                read->offset_m,
+               read->aside_rad,
+               read->hidden_offset_rel,
                read->lag_s,
                read->scale * acceleration / config.filter.sigma_a_m_s2};
     scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {

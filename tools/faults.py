@@ -286,17 +286,19 @@ def main():
                 ended = trial.run()
                 problems.append(f"{name}: exit {ended.returncode} without any fault: {ended.stderr.strip()[:200]}")
                 continue
+            done = collections.Counter()
             if "calls" in args.campaigns:
-                total.update(fail_calls(trial, shim, generator, args.kinds.split(","), most(200)))
+                done.update(fail_calls(trial, shim, generator, args.kinds.split(","), most(200)))
             if "kill" in args.campaigns:
-                total.update(kill(trial, generator, most(1000)))
-                total.update(kill_at_calls(trial, shim, generator, 1 if args.short else 0))
-                total.update(kill_twice(trial, shim, 2 if args.short else 0))
+                done.update(kill(trial, generator, most(1000)))
+                done.update(kill_at_calls(trial, shim, generator, 1 if args.short else 0))
+                done.update(kill_twice(trial, shim, 2 if args.short else 0))
             if "together" in args.campaigns:
-                total.update(together(trial, 4 if args.short else 64))
+                done.update(together(trial, 4 if args.short else 64))
             if "pipe" in args.campaigns:
-                total.update(closed_pipe(trial))
-            print(f"{name:12} {len(trial.problems)} problems", flush=True)
+                done.update(closed_pipe(trial))
+            total.update(done)
+            print(f"{name:12} {len(trial.problems)} problems;", ", ".join(f"{count} {kind}" for kind, count in done.items()), flush=True)
             for problem in trial.problems[:20]:
                 print(f"  {problem}", flush=True)
             problems += trial.problems

@@ -223,11 +223,22 @@ class SoFar {
   std::future<void> writing_;  // last: it uses the others
 };
 
+/// Where a run was killed while it replaced these files, they wait in a hidden folder.
+void end_killed_exchange(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) return;
+  try {
+    const FolderSwap next(folder);
+  } catch (const InputError&) {  // a folder that cannot be written: what stands there is read
+  }
+}
+
 /// log.csv that an earlier run left, or was on its way to.
 std::optional<RotationLog> log_to_resume(const std::string& folder, Run& run) {
   if (folder.empty()) return std::nullopt;
   const std::filesystem::path dir = folder;
   std::error_code error;
+  end_killed_exchange(dir / "so-far");
   std::filesystem::path file = dir / "so-far" / "log.csv";  // is there only where the run did not end
   if (!std::filesystem::exists(file, error)) file = dir / "log.csv";
   run.add_input("log", file);

@@ -166,6 +166,20 @@ std::vector<std::string> calibrating_simulated(const std::string& camera, const 
           out};
 }
 
+TEST_F(HeadCommand, ResumeFindsALogWhoseRunWasKilledWhileItReplacedIt) {
+  ASSERT_EQ(alidade(calibrating_simulated("", path("first"))).code, 0);
+  const std::filesystem::path so_far = path("first") + "/so-far", hidden = so_far / ".alidade-killed";
+  std::filesystem::create_directories(hidden / "new");
+  std::filesystem::create_directories(hidden / "older");
+  std::filesystem::copy(path("first") + "/log.csv", hidden / "older/log.csv");
+  std::vector<std::string> second = calibrating_simulated("", path("second"));
+  second.insert(second.end(), {"--resume", path("first")});
+  const testing::Outcome after = alidade(second);
+  ASSERT_EQ(after.code, 0) << after.err;
+  EXPECT_EQ(nlohmann::json::parse(after.out)["inputs"][0]["name"], (so_far / "log.csv").string())
+      << "not the log of the run before it";
+}
+
 TEST_F(HeadCommand, WhatWasMeasuredBeforeCountsAfterResume) {
   std::vector<std::string> second = calibrating_simulated("", path("second"));
   second.insert(second.end(), {"--resume", path("first")});

@@ -165,8 +165,8 @@ void add_rangefinder(App& app) {
        .writes_at_end = true},
       [args](Run& run) { return run_rangefinder(*args, run); });
   command.add_option("shots", args->shots,
-                     "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane); none "
-                     "with --live");
+                     "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane, "
+                     "nx x + ny y + nz z + d = 0); none with --live");
   add_guided_shots_options(command, args->guided);
   app.add_fields(command, fields_of(*args));
 }

@@ -259,6 +259,7 @@ TEST_F(RangefinderCommand, SaysWhatIsWrongWithItsInput) {
   expect("range_m,u,v\n2.31,1e300,5\n", "shots.csv:2");
   expect("range_m,nx,ny,nz,d\n2.31,0,0,2,-2\n", "the normal's length is 2, not 1");
   expect("range_m,nx,ny,nz,d\n2.31,0,0,1,0\n", "passes through the camera's centre");
+  expect("range_m,nx,ny,nz,d\n2.31,0,0,1,2.3\n1.31,0,0,1,1.3\n1.5,0,0.6,0.8,1.5\n", "is 'd' of the other sign?");
   expect("range_m,photo\n2.31,none.jpg\n", "none.jpg");
   write_file(path("text.jpg"), "not an image");
   expect("range_m,photo\n2.31,text.jpg\n", "text.jpg");

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <set>
@@ -109,6 +110,18 @@ Shot shot_of_row(const Csv& csv, std::size_t row, const ShotColumns& columns) {
   return read;
 }
 
+/// Where the camera looks at none of several boards, the distances have the other sign. Planes here have d < 0.
+void refuse_planes_behind(const Csv& csv, std::span<const Shot> shots) {
+  constexpr std::ptrdiff_t several = 3;
+  const auto has_plane = [](const Shot& shot) { return shot.plane.has_value(); };
+  const auto is_behind = [](const Shot& shot) { return shot.plane && shot.plane->normal_in_cam.z() < 0.0; };
+  const auto num = std::ranges::count_if(shots, has_plane);
+  if (num >= several && std::ranges::count_if(shots, is_behind) == num)
+    throw InputError(
+        csv.name() +
+        ": all planes are behind the camera: a board's points x have n·x + d = 0, is 'd' of the other sign?");
+}
+
 std::string number(double value) { return fmt::format("{:.9g}", value); }
 
 }  // namespace
@@ -130,6 +143,7 @@ ShotsFile read_shots(const Csv& csv, const ShotsOptions& options) {
     read.shots.push_back(std::move(shot));
   });
   if (read.shots.empty()) throw InputError(csv.name() + ": has no shots; at least one row is needed");
+  refuse_planes_behind(csv, read.shots);
   return read;
 }
 

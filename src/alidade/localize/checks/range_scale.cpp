@@ -185,7 +185,8 @@ std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const Be
                                       const Eigen::MatrixXd& of_beam, double of_surface) {
   const auto fit = fault_fit(fault, scales, 0, 0);
   if (!fit || !(fit->scale > 0.0)) return std::nullopt;
-  FoundFault found{*fit};
+  FoundFault found;
+  found.fit = *fit;
   Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(fault.num, fault.num);
   double of_scale = 0.0;
   for (std::size_t i = 0; i < num_blocks; ++i) {

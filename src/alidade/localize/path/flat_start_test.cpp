@@ -4,6 +4,7 @@
 
 #include "alidade/localize/path/path_error.h"
 #include "alidade/localize/path/path_smoother.h"
+#include "alidade/simulate/draws.h"
 #include "alidade/testing/hover.h"
 
 namespace alidade {
@@ -57,6 +58,38 @@ TEST(FlatStart, OwesNothingToThePathThatIsHandedOver) {
     const PathError error = path_error(timed(*flat, path->world_from_cam), run.truth, false);
     EXPECT_LT(error.ate_m, 0.01) << seed;
     EXPECT_LT(cost_of(*path, wrong.filter.gate), 1.2 * 2.0 * static_cast<double>(wrong.observations.size()));
+  }
+}
+
+/// Points far away, each seen in a few frames from nearly the same direction, and supposed to be near: no step of Gauss
+/// and Newton moves them without some of them going through the camera. The path is solved all the same.
+TEST(PathSmoother, WhatNothingDeterminesDoesNotEndIt) {
+  for (const std::uint64_t seed : {41u, 42u, 43u, 44u}) {
+    const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 40}, seed);
+    SmootherProblem problem = problem_of(run, Eigen::Vector3d::Zero());
+    Draws draws(seed);
+    constexpr std::size_t num_far = 30, num_frames = 4;
+    for (std::size_t i = 0; i < num_far; ++i) {
+      const std::size_t first = 2 + i * 50 / num_far;
+      const Rigid3& seen_from = problem.world_from_cam[first];
+      const Eigen::Vector3d ray(draws.uniform(-0.2, 0.2), draws.uniform(-0.2, 0.2), 1.0);
+      constexpr double far = 300.0, supposed = 0.3;
+      SmootherPoint point;
+      point.id = static_cast<long>(100000 + i);
+      point.point_in_world = seen_from * Eigen::Vector3d(supposed * ray);
+      point.first_frame = first;
+      point.range = RangePrior{supposed, 5.0};
+      for (std::size_t k = first; k < first + num_frames; ++k)
+        if (const auto px =
+                project(run.camera, problem.world_from_cam[k].inverse() * (seen_from * Eigen::Vector3d(far * ray))))
+          problem.observations.push_back({k, point.id, *px + 0.5 * draws.normal2(), 0.5});
+      problem.points.push_back(point);
+    }
+    std::ranges::stable_sort(problem.observations, {}, &UsedObservation::frame);
+    const auto path = smoothed_path(problem);
+    ASSERT_TRUE(path) << seed;
+    const PathError error = path_error(timed(problem, path->world_from_cam), run.truth, false);
+    EXPECT_LT(error.ate_m, 0.01) << seed;
   }
 }
 

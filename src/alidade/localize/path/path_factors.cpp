@@ -268,8 +268,28 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
   system.cost += error.dot(information * error);
 }
 
-/// None also where it costs more than `most`: then the rest of it is not needed.
-std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared, double most) const {
+/// Where steps are kept short: those of a frame's pose, and of the points that enter with it, are zero give or take a
+/// share of the distances there, as measured: K. Levenberg 1944, and D. W. Marquardt 1963, in units of the scene.
+void PathSmoother::keep_steps_short(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
+  if (!(step_share_ > 0.0) || there_[k].empty()) return;
+  double sum = 0.0;
+  const auto distance_to = [&](std::size_t point) {
+    constexpr double nearest = 1e-9;
+    return std::max((state.points[point] - state.poses[k].translation).norm(), nearest);
+  };
+  for (const std::size_t point : there_[k]) sum += 1.0 / distance_to(point);
+  const double distance = static_cast<double>(there_[k].size()) / sum;
+  system.chain.A.diagonal().head<3>().array() += std::pow(step_share_ * distance, -2);
+  system.chain.A.diagonal().segment<3>(3).array() += std::pow(step_share_, -2);
+  for (const std::size_t point : entering_[k])
+    system.chain.B.diagonal().segment<3>(system.chain.place_of(point)).array() +=
+        std::pow(step_share_ * distance_to(point), -2);
+}
+
+/// None also where it costs more than `most`: then the rest of it is not needed; and where a point is not determined,
+/// which `vague` is told.
+std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared, double most,
+                                                  std::optional<std::size_t>* vague) const {
   SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_solved(), max_at_once_)};
   system.has_given = shared == Shared::all;
   if (system.has_given)
@@ -293,9 +313,13 @@ std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Sh
     add_imu(state, k, system);
     if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_given;
     if (fixed_ && fixed_->frame == k) add_fixed(state, system);
+    keep_steps_short(state, k, system);
     if (!(system.cost <= most) || !system.chain.eliminate()) return std::nullopt;
     for (const std::size_t point : leaving_[k])
-      if (!system.chain.leave(point)) return std::nullopt;
+      if (!system.chain.leave(point)) {
+        if (vague != nullptr) *vague = point;
+        return std::nullopt;
+      }
   }
   return system;
 }

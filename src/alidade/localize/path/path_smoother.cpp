@@ -82,29 +82,78 @@ SmootherState PathSmoother::moved_by(const Eigen::VectorXd& shared, const PoseCh
   return moved;
 }
 
-/// Whole Gauss–Newton steps where the cost falls, else shorter ones; until one would gain less than `settled`, in σ²
-/// over all that is solved for.
-bool PathSmoother::settle(double settled) {
-  constexpr int max_iterations = 25;
+/// The equations at the state, without the observations of points that these do not determine.
+std::optional<SmootherSystem> PathSmoother::begun() {
+  constexpr std::size_t few = 20;
+  for (std::size_t num = 0; few * num <= state_.points.size(); ++num) {
+    find_lives();
+    std::optional<std::size_t> vague;
+    auto system = build(state_, Shared::solved, std::numeric_limits<double>::infinity(), &vague);
+    if (system || !vague) return system;
+    std::erase_if(observations_, [&](const UsedObservation& each) { return index_of_.at(each.id) == *vague; });
+    std::erase(point_of_, *vague);
+  }
+  return std::nullopt;
+}
+
+/// A step that lowers the cost, and the equations behind it: a whole one of Gauss and Newton, else a shorter one. None:
+/// none does.
+std::optional<SmootherSystem> PathSmoother::step_along(const SmootherSystem& system) {
   constexpr double min_share = 0.02;
-  find_lives();
-  auto system = build(state_, Shared::solved);
-  for (int iteration = 0; system && iteration < max_iterations; ++iteration) {
+  const int num = num_solved();
+  const Eigen::LLT<Eigen::MatrixXd> llt(system.chain.B.topLeftCorner(num, num));
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Eigen::VectorXd shared = llt.solve(system.chain.b.head(num));
+  const auto steps = system.chain.steps(shared);
+  for (double share = 1.0; share > min_share; share *= 0.5) {
+    const SmootherState there = moved_by(shared, steps, share);
+    auto next = build(there, Shared::solved, system.cost + 1e-9 * (1.0 + system.cost));
+    if (!next) continue;
+    state_ = there;
+    return next;
+  }
+  return std::nullopt;
+}
+
+/// Where none does: what little determines, as the depth of a point that was seen along its ray, would go through the
+/// camera. Steps that are short there, until one lowers the cost; the next one may be three times as long.
+std::optional<SmootherSystem> PathSmoother::short_step(double& share) {
+  constexpr double least = 1e-4, shorter = 0.3, longer = 3.0;
+  for (; share > least; share *= shorter) {
+    step_share_ = share;
+    const auto system = build(state_, Shared::solved);
+    step_share_ = 0.0;
+    if (!system) continue;
+    auto next = step_along(*system);
+    if (!next) continue;
+    share *= longer;
+    return next;
+  }
+  return std::nullopt;
+}
+
+/// Until a whole step would gain less than `settled`, in σ² over all that is solved for; where only short ones lower
+/// the cost, until one of nearly the distances themselves gains nothing: what a whole one would is that point's at
+/// infinity.
+bool PathSmoother::settle(double settled) {
+  constexpr int max_iterations = 25, max_short = 60;
+  constexpr double short_share = 0.3, long_share = 30.0, nothing = 0.01, hardly = 0.1;
+  double share = long_share;
+  int num_short = 0;
+  auto system = begun();
+  for (int iteration = 0; system && iteration < max_iterations + num_short; ++iteration) {
     const int num = num_solved();
     const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
     if (llt.info() != Eigen::Success) return false;
-    const Eigen::VectorXd shared = llt.solve(system->chain.b.head(num));
-    const double gain = system->chain.gain() + shared.dot(system->chain.b.head(num));
+    const double gain = system->chain.gain() + llt.solve(system->chain.b.head(num)).dot(system->chain.b.head(num));
     if (gain < settled) return true;
-    const auto steps = system->chain.steps(shared);
-    std::optional<SmootherSystem> next;
-    double share = 1.0;
-    for (; share > min_share && !next; share *= 0.5) {
-      const SmootherState there = moved_by(shared, steps, share);
-      next = build(there, Shared::solved, system->cost + 1e-9 * (1.0 + system->cost));
-      if (next) state_ = there;
+    auto next = share < long_share ? std::nullopt : step_along(*system);
+    if (!next && gain < hardly) return true;
+    if (!next && num_short++ < max_short) {
+      if (share >= long_share) share = short_share;
+      next = short_step(share);
+      if (next && share > short_share && system->cost - next->cost < nothing) return true;
     }
-    if (!next) return gain < 0.1;
     system = std::move(next);
   }
   return false;

@@ -49,9 +49,14 @@ class PathSmoother {
   [[nodiscard]] int num_solved() const { return lens_at_ + num_estimated_; }
   static constexpr double well = 1e-3;
   [[nodiscard]] bool settle(double settled = well);
+  [[nodiscard]] std::optional<SmootherSystem> begun();
+  [[nodiscard]] std::optional<SmootherSystem> step_along(const SmootherSystem& system);
+  [[nodiscard]] std::optional<SmootherSystem> short_step(double& share);
+  void keep_steps_short(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   enum class Shared { solved, all };  ///< What stands in the border: all only for what comes of a solution.
   [[nodiscard]] std::optional<SmootherSystem> build(const SmootherState& state, Shared shared,
-                                                    double most = std::numeric_limits<double>::infinity()) const;
+                                                    double most = std::numeric_limits<double>::infinity(),
+                                                    std::optional<std::size_t>* vague = nullptr) const;
   [[nodiscard]] SmootherState moved_by(const Eigen::VectorXd& shared, const PoseChain::Steps& steps,
                                        double share) const;
   void find_lives();
@@ -190,6 +195,7 @@ class PathSmoother {
   std::vector<std::optional<Life>> lives_;
   std::vector<std::vector<std::size_t>> entering_, leaving_, there_;  ///< Points, by frame.
   int max_at_once_ = 0;
+  double step_share_ = 0.0;  ///< Of the distances, that steps are kept to; 0: not kept.
 };
 
 }  // namespace alidade

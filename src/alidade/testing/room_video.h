@@ -26,6 +26,7 @@ struct RoomScene {
   double rate_hz = 30.0;
   double noise = 2.0;      ///< σ of the grey values.
   double amplitude = 1.0;  ///< Of the path: 1 is ± 0.12 m aside and ± 7°.
+  long num_columns = 0;    ///< Of squares, after which wall and table look the same again, as wallpaper; 0: never.
 };
 
 /// A grey value of a cell of a surface, the same at every call.
@@ -37,14 +38,16 @@ inline double cell_grey(long i, long j, long surface) {
 }
 
 /// Squares of different greys with edges about a pixel wide, so that pixels need not be averaged.
-inline double squares_grey(double s_m, double t_m, long surface) {
+inline double squares_grey(double s_m, double t_m, long surface, long num_columns = 0) {
   constexpr double cell_m = 0.045, edge_m = 0.008;
   const auto ramp = [](double within) { return std::clamp((within - 0.5) * cell_m / edge_m + 0.5, 0.0, 1.0); };
-  const double s = s_m / cell_m, t = t_m / cell_m;
+  const double along = s_m / cell_m, t = t_m / cell_m, n = static_cast<double>(num_columns);
+  const double s = num_columns > 0 ? along - n * std::floor(along / n) : along;
   const auto i = static_cast<long>(std::floor(s)), j = static_cast<long>(std::floor(t));
+  const long next = i + 1 == num_columns ? 0 : i + 1;
   const double a = ramp(s - static_cast<double>(i)), b = ramp(t - static_cast<double>(j));
-  return (1 - b) * ((1 - a) * cell_grey(i, j, surface) + a * cell_grey(i + 1, j, surface)) +
-         b * ((1 - a) * cell_grey(i, j + 1, surface) + a * cell_grey(i + 1, j + 1, surface));
+  return (1 - b) * ((1 - a) * cell_grey(i, j, surface) + a * cell_grey(next, j, surface)) +
+         b * ((1 - a) * cell_grey(i, j + 1, surface) + a * cell_grey(next, j + 1, surface));
 }
 
 /// 1 inside a rectangle of half sides x and y, 0 outside, with an edge of finite width.
@@ -65,7 +68,7 @@ inline double grey_of(const RoomScene& scene, const Eigen::Vector3d& from, const
     grey = *value;
   };
   const auto squares = [&](double s, double t, long surface) {
-    return scene.has_texture ? squares_grey(s, t, surface) : 128.0;
+    return scene.has_texture ? squares_grey(s, t, surface, scene.num_columns) : 128.0;
   };
   constexpr double table_m = 0.30, box_z_m = -0.12, box_x_m = 0.28, back_m = 0.5;
   meet(-from.z() / ray.z(), [&](const Eigen::Vector3d& p) -> std::optional<double> {

@@ -231,24 +231,27 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
   const double depth_m = usual_depth_m();
   for (const CornerFeature& corner : corners_in_empty_cells(smoothed, in_view_, corners)) {
     if (most == 0 || !make_room()) return;
-    const Eigen::Vector2d px = corner.px.cast<double>();
-    const auto ray_in_cam = unproject(engine_.camera(), px);
-    if (!ray_in_cam || !is_shown(px)) continue;
-    constexpr double min_z = 0.2;  // at the edge of a wide lens a depth is no distance
-    const double range_m = depth_m / std::max(ray_in_cam->z(), min_z);
-    const Rigid3 world_from_cam = engine_.best().motion().world_from_cam;
-    auto landmark = new_landmark(next_id_, smoothed, engine_.camera(), world_from_cam, px,
-                                 world_from_cam * (range_m * *ray_in_cam));
-    if (!landmark || !engine_.filters().add(next_id_, px, {range_m, prior_share, !config_.depth_m})) continue;
-    landmark->last_found = frame_;
-    landmark->last_px = px;
-    landmark->first_step = num_taken_;
-    record_.entered(num_taken_, next_id_, {range_m, prior_share}, false);
-    now_.push_back({next_id_, px, config_.features.sigma_floor_px});
-    landmarks_[next_id_++] = *landmark;
-    ++num_found_now_;
-    --most;
+    if (add_landmark(smoothed, corner.px.cast<double>(), depth_m)) --most;
   }
+}
+
+bool ImageLocalizer::add_landmark(const cv::Mat& smoothed, const Eigen::Vector2d& px, double depth_m) {
+  const auto ray_in_cam = unproject(engine_.camera(), px);
+  if (!ray_in_cam || !is_shown(px)) return false;
+  constexpr double min_z = 0.2;  // at the edge of a wide lens a depth is no distance
+  const double range_m = depth_m / std::max(ray_in_cam->z(), min_z);
+  const Rigid3 world_from_cam = engine_.best().motion().world_from_cam;
+  auto landmark =
+      new_landmark(next_id_, smoothed, engine_.camera(), world_from_cam, px, world_from_cam * (range_m * *ray_in_cam));
+  if (!landmark || !engine_.filters().add(next_id_, px, {range_m, prior_share, !config_.depth_m})) return false;
+  landmark->last_found = frame_;
+  landmark->last_px = px;
+  landmark->first_step = num_taken_;
+  record_.entered(num_taken_, next_id_, {range_m, prior_share}, false);
+  now_.push_back({next_id_, px, config_.features.sigma_floor_px});
+  landmarks_[next_id_++] = *landmark;
+  ++num_found_now_;
+  return true;
 }
 
 /// From a pose where the camera may be: a wide search, an update of the filter, and a second look that has to find
@@ -368,9 +371,12 @@ PathStep ImageLocalizer::taken(const cv::Mat& grey, const cv::Mat& smoothed, lon
   }
   engine_.fill_pose(step);
   engine_.keep_given();
-  if (step.event == FrameEvent::tracked)
-    keyframes_.offer(grey, step.world_from_cam, config_.features.near_share * usual_depth_m(),
-                     config_.features.near_rad, num_taken_);
+  if (step.event == FrameEvent::tracked) {
+    const double depth_m = usual_depth_m();
+    keyframes_.offer(grey, step.world_from_cam, config_.features.near_share * depth_m, config_.features.near_rad,
+                     num_taken_);
+    close_loop(smoothed, depth_m);
+  }
   return step;
 }
 

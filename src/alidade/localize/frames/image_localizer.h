@@ -5,6 +5,7 @@
 #include "alidade/localize/engine.h"
 #include "alidade/localize/frames/image_target.h"
 #include "alidade/localize/frames/landmark.h"
+#include "alidade/localize/frames/landmark_descriptions.h"
 #include "alidade/localize/frames/still_parts.h"
 #include "alidade/localize/path/keyframes.h"
 #include "alidade/localize/path/whole_path.h"
@@ -57,6 +58,12 @@ class ImageLocalizer {
   void count(std::span<const FeatureObservation> observations, const ObservationsReport& report);
   void drop_bad();
   void add_new(const cv::Mat& smoothed);
+  /// Whether it entered.
+  bool add_landmark(const cv::Mat& smoothed, const Eigen::Vector2d& px, double depth_m);
+  void close_loop(const cv::Mat& smoothed, double usual_depth_m);
+  void recognise(const cv::Mat& smoothed);
+  bool take_recognised(const cv::Mat& smoothed, const Rigid3& world_from_cam);
+  void enter_again(const cv::Mat& smoothed, const LandmarkSeen& seen);
   [[nodiscard]] bool make_room();
   void let_go(long id);
   [[nodiscard]] double period_s() const { return config_.period_s > 0.0 ? config_.period_s : period_s_; }
@@ -83,6 +90,10 @@ class ImageLocalizer {
     Landmark landmark;
   };
   std::map<long, Gone> gone_;  ///< Points that left a full map.
+  LandmarkDescriptions descriptions_;
+  std::optional<Rigid3> last_described_;
+  std::map<long, long> number_of_;  ///< Of landmarks recognised: of which one of before.
+  std::map<long, long> latest_;     ///< By number: the landmark as it was recognised last.
   struct Saved {
     KnownPoint point;
     Landmark landmark;

@@ -21,7 +21,7 @@ void ImageLocalizer::let_go(long id) {
 }
 
 Recording ImageLocalizer::recording() const {
-  Recording recording{record_, kept_, {}, {}, period_s(), {}};
+  Recording recording{record_, kept_, {}, number_of_, period_s(), {}};
   for (const auto& [id, gone] : gone_) recording.gone.push_back(gone.point);
   recording.num_used = [this](long id) {
     const auto at = landmarks_.find(id);

@@ -187,6 +187,7 @@ restarts      count  poses that were found again
 sights        count  observations used
 sights_gated  count  observations rejected
 loops         count  returns to what was seen long before
+loops_rejected  count  of those that contradict the other observations: places that look alike
 tested[].
   name   text  error that was looked for
   asked  1     its size

@@ -89,6 +89,7 @@ void fill_path_estimate(const Localization& result, ResultDocument& document) {
   estimate["scale_known"] = result.scale_known;
   estimate["restarts"] = result.num_restarts;
   estimate["loops"] = result.num_loops;
+  estimate["loops_rejected"] = result.num_loops_rejected;
   estimate["sights"] = result.num_observations;
   estimate["sights_gated"] = result.num_gated;
   JsonValue tested = JsonValue::list();
@@ -161,6 +162,9 @@ void path_lines(const Localization& result, std::vector<std::string>& lines) {
                                 result.smoothed_every));
   if (result.num_loops > 0)
     lines.push_back(fmt::format("{} loops closed: what was seen long before is seen again", result.num_loops));
+  if (result.num_loops_rejected > 0)
+    lines.push_back(fmt::format("{} loops rejected: places that look alike, or have the same numbers, and are not one",
+                                result.num_loops_rejected));
   if (result.imu && result.imu->fault == ImuFault::none)
     lines.push_back(fmt::format("IMU: {} steps, {} rejected; scale ± {:.2g} % (3σ), clock {:.4f} ± {:.4f} s",
                                 result.imu->num_steps, result.imu->num_rejected, 300.0 * result.imu->sigma_scale,

@@ -228,17 +228,24 @@ void add_side(const Localization& report, Verdict& verdict) {
       "check that x goes right and y down as the target is seen; if +z is its front, say 'seen_from: +z' in --target";
 }
 
+/// In images innovations say little of σ: a patch is looked for as it was seen first, its error lasts from image to
+/// image, and is no innovation. Of films whose NIS is 0.13 to 0.37 the path is 0.6 to 3.4 times its σ off; with σ of a
+/// match as the innovations have it, up to 4.7 times.
 void add_innovations(const Localization& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
-  const State state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
+  constexpr double lasting_low = 0.1;
+  const double low = report.is_of_images ? lasting_low : good_nis_low;
+  const State state = nis < low ? State::care : state_of(nis, good_nis_high, care_nis);
   const std::string px = text_of(report.sigma_px, 2) + " px";
-  const std::string low = report.is_of_images ? "matches are better than the " + px +
-                                                    " that they are taken for, and σ is too large "
-                                                    "(--sigma-px)"
-                                              : "noise is smaller than the " + px + " stated";
-  const std::string said = nis > good_nis_high  ? "the observations do not fit: the lens or the noise is not as stated"
-                           : nis < good_nis_low ? low
-                                                : "innovations as large as predicted";
+  std::string said = "innovations as large as predicted";
+  if (nis > good_nis_high)
+    said = "the observations do not fit: the lens or the noise is not as stated";
+  else if (nis < low)
+    said = report.is_of_images
+               ? "matches are better than the " + px + " that they are taken for, and σ is too large (--sigma-px)"
+               : "noise is smaller than the " + px + " stated";
+  else if (nis < good_nis_low)
+    said = "innovations smaller than the " + px + " of a match: a patch's error lasts from image to image";
   verdict.checks.push_back({"innovations", state, "NIS " + text_of(nis, 3) + " per degree of freedom: " + said, nis,
                             good_nis_high, "1", "nis"});
 }

@@ -247,8 +247,9 @@ bool has_many_mismatches(const Explained& explained) {
   return (1.0 - in_common) * num_misfits > (1.0 - well) * static_cast<double>(explained.num);
 }
 
-/// Whether the lens has no part in it: the path is of all that was seen, and nothing is left that depends on where in
-/// the image it was, as another kind of lens leaves it.
+/// Whether the lens has no part in it: the path is of all that was seen (but for points that are in no map, as those of
+/// images that were hardly found again), and nothing is left that depends on where in the image it was, as another kind
+/// of lens leaves it.
 bool leaves_no_trace(const Localization& result, const Explained& explained) {
   constexpr double nearly_all = 0.99;
   const std::set<std::string_view> traces{"camera", "radial structure", "position in the image"};
@@ -257,7 +258,9 @@ bool leaves_no_trace(const Localization& result, const Explained& explained) {
         return check.state != State::good && traces.contains(check.name);
       }))
     return false;
-  return explained.share() >= nearly_all;
+  const auto num_placed = static_cast<double>(explained.num_placed);
+  return static_cast<double>(explained.num_fit) >= nearly_all * num_placed &&
+         num_placed >= well * static_cast<double>(explained.num);
 }
 
 std::string text_about(const OtherLensKind& other, const Lens& given) {

@@ -139,6 +139,7 @@ bool PathSmoother::add_observations(const SmootherState& state, std::size_t k, L
 /// again, with no more weight than it has as one of a row.
 void PathSmoother::link_observations(double correlation) {
   std::map<long, std::size_t> last;
+  link_correlation_ = correlation;
   links_.assign(observations_.size(), {});
   for (std::size_t i = 0; i < observations_.size(); ++i) {
     const auto [at, is_first] = last.try_emplace(observations_[i].id, i);

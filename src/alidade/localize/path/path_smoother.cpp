@@ -92,6 +92,7 @@ std::optional<SmootherSystem> PathSmoother::begun() {
     if (system || !vague) return system;
     std::erase_if(observations_, [&](const UsedObservation& each) { return index_of_.at(each.id) == *vague; });
     std::erase(point_of_, *vague);
+    if (!links_.empty()) link_observations(link_correlation_);
   }
   return std::nullopt;
 }

@@ -166,6 +166,7 @@ class PathSmoother {
   };
   ResidualStructure structure_;
   std::vector<Link> links_;  ///< Of each observation; none: errors are independent.
+  double link_correlation_ = 0.0;
   std::map<long, std::size_t> index_of_;
   std::vector<int> lens_order_;  ///< Those estimated, then the others.
   std::vector<double> sigma_estimated_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -27,6 +28,39 @@ void require_sense(const std::vector<ServoSample>& log) {
   }
 }
 
+/// The log of an encoder that begins again after a turn, unwrapped; none where no step is longer than half a turn, or
+/// the angles cover more than a turn.
+std::vector<ServoSample> unwrapped(const std::vector<ServoSample>& log, std::size_t& wraps) {
+  constexpr double turn_rad = 2.0 * std::numbers::pi;
+  const auto [low, high] = std::ranges::minmax_element(log, {}, &ServoSample::angle_rad);
+  wraps = 0;
+  if (high->angle_rad - low->angle_rad > 1.001 * turn_rad) return {};
+  std::vector<ServoSample> rows = log;
+  double turns = 0.0;
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const double wrapped = std::round((log[i].angle_rad - log[i - 1].angle_rad) / turn_rad);
+    wraps += wrapped != 0.0 ? 1 : 0;
+    turns -= wrapped;
+    rows[i].angle_rad += turns * turn_rad;
+  }
+  return rows;
+}
+
+/// As read, or unwrapped where that leaves clearly less.
+void identify_turns(Identification& result) {
+  constexpr double clearly = 0.5;
+  static_cast<ServoIdentification&>(result) = identify_servo(result.log, result.config.kind);
+  std::size_t wraps = 0;
+  const std::vector<ServoSample> rows = unwrapped(result.log, wraps);
+  if (wraps == 0) return;
+  const ServoIdentification turned = identify_servo(rows, result.config.kind);
+  if (!turned.fit.is_observable || (result.fit.is_observable && turned.fit.rms_rad > clearly * result.fit.rms_rad))
+    return;
+  static_cast<ServoIdentification&>(result) = turned;
+  result.log = rows;
+  result.encoder_wraps = wraps;
+}
+
 /// The rate of the log's clock, and what of the plant it moves most.
 Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
   Assumption clock{.name = "clock_rate", .value = 1.0, .sigma = sigma_clock, .moved = "tau_s"};
@@ -42,11 +76,13 @@ Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
 }
 
 /// Assumptions. By definition: angles are the encoder's own radians, and a command is valid from its own time on.
-std::vector<Assumption> assumed_of(const ServoIdentification& identified, double sigma_clock) {
+std::vector<Assumption> assumed_of(const Identification& identified, double sigma_clock) {
   const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
                                      assumed_clock(identified.fit, sigma_clock),
                                      {.name = "command_offset_s", .value = 0.0, .sigma = 0.0, .moved = "latency_s"}};
+  if (identified.encoder_wraps > 0)
+    assumed.push_back({.name = "encoder_turn_rad", .value = 2.0 * std::numbers::pi, .sigma = 0.0, .moved = "gain_rad"});
   for (const CountedFlaw& counted : identified.counted) {
     const bool is_listed =
         std::ranges::any_of(identified.hidden, [&](const HiddenFlaw& hidden) { return hidden.flaw == counted.flaw; });
@@ -101,10 +137,14 @@ Identification identify(std::vector<ServoSample> log, const IdentifyConfig& conf
   Identification result;
   result.log = std::move(log);
   result.config = config;
-  if (result.log.size() >= min_rows)
-    static_cast<ServoIdentification&>(result) = identify_servo(result.log, config.kind);
+  if (result.log.size() >= min_rows) identify_turns(result);
   if (result.fit.is_observable) count_clock_rate(config.sigma_clock, result.fit);
   result.verdict = identify_verdict(result.log, result);
+  if (result.encoder_wraps > 0)
+    result.verdict.checks.push_back(
+        {"wraps", State::good,
+         "the encoder begins again after a turn, " + std::to_string(result.encoder_wraps) + " times: unwrapped",
+         static_cast<double>(result.encoder_wraps), 0.0, "wraps", ""});
   result.counts.given = result.counts.used = result.log.size();
   if (result.residual_rad.empty()) return result;
   result.encoder_step_rad = encoder_step_rad(result.log);

@@ -141,6 +141,7 @@ struct Identification : ServoIdentification {
   std::vector<ServoSample> log;
   IdentifyConfig config;
   double encoder_step_rad = 0.0;  ///< Where the angles are its whole multiples; 0: not seen.
+  std::size_t encoder_wraps = 0;  ///< Where the encoder begins again after a turn: `log` has them unwrapped.
   std::vector<Assumption> assumed;
   Counts counts;  ///< Of rows.
   Verdict verdict;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <variant>
 
 #include "alidade/identify.h"
@@ -121,6 +122,21 @@ TEST(ServoLogTimes, StampsThatErrAreCounted) {
     }
   }
   EXPECT_LE(num_clean_seen, 1 + draws / 25);
+}
+
+/// An encoder that begins again at half a turn: unwrapped, and said.
+TEST(ServoLogTimes, AnEncoderThatBeginsAgainIsUnwrapped) {
+  for (const bool is_rate_plant : {false, true}) {
+    ServoLogScene scene = late_scene(is_rate_plant);
+    std::vector<ServoSample> log = log_of(scene, 1);
+    const ServoFit straight = identify(log).fit;
+    for (ServoSample& row : log) row.angle_rad = std::remainder(row.angle_rad + 3.1, 2.0 * std::numbers::pi);
+    const Identification found = identify(log);
+    EXPECT_GT(found.encoder_wraps, 0u);
+    EXPECT_EQ(found.verdict.state, State::good) << found.verdict.sentence;
+    for (int param = 0; param < 3; ++param)
+      EXPECT_NEAR(found.fit.params[param], straight.params[param], 0.01 * std::sqrt(straight.cov(param, param)));
+  }
 }
 
 }  // namespace

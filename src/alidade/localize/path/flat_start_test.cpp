@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "alidade/localize/path/path_error.h"
 #include "alidade/localize/path/path_smoother.h"
@@ -62,19 +63,20 @@ TEST(FlatStart, OwesNothingToThePathThatIsHandedOver) {
 }
 
 /// Points far away, each seen in a few frames from nearly the same direction, and supposed to be near: no step of Gauss
-/// and Newton moves them without some of them going through the camera. The path is solved all the same.
+/// and Newton moves them without some of them going through the camera, and some are left out. The path is solved all
+/// the same. (The last one leaves out a point after its errors were found to last.)
 TEST(PathSmoother, WhatNothingDeterminesDoesNotEndIt) {
-  for (const std::uint64_t seed : {41u, 42u, 43u, 44u}) {
+  for (const std::uint64_t seed : {41u, 43u, 44u, 46u}) {
     const double lasting = seed % 2 == 0 ? 0.9 : 0.0;  // of errors from frame to frame, which the path is solved with
     const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 40, .lasting = lasting}, seed);
     SmootherProblem problem = problem_of(run, Eigen::Vector3d::Zero());
     Draws draws(seed);
-    constexpr std::size_t num_far = 30, num_frames = 4;
+    constexpr std::size_t num_far = 120, num_frames = 4;
     for (std::size_t i = 0; i < num_far; ++i) {
       const std::size_t first = 2 + i * 50 / num_far;
       const Rigid3& seen_from = problem.world_from_cam[first];
       const Eigen::Vector3d ray(draws.uniform(-0.2, 0.2), draws.uniform(-0.2, 0.2), 1.0);
-      constexpr double far = 300.0, supposed = 0.3;
+      const double far = std::pow(10.0, draws.uniform(2.0, 9.0)), supposed = 0.3;
       SmootherPoint point;
       point.id = static_cast<long>(100000 + i);
       point.point_in_world = seen_from * Eigen::Vector3d(supposed * ray);

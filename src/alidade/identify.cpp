@@ -28,8 +28,8 @@ void require_sense(const std::vector<ServoSample>& log) {
   }
 }
 
-/// The log of an encoder that begins again after a turn, unwrapped; none where no step is longer than half a turn, or
-/// the angles cover more than a turn.
+/// The log of an encoder that begins again after a turn, unwrapped at each step longer than half a turn; `wraps`: how
+/// many those are. None where the angles cover more than a turn [rad].
 std::vector<ServoSample> unwrapped(const std::vector<ServoSample>& log, std::size_t& wraps) {
   constexpr double turn_rad = 2.0 * std::numbers::pi;
   const auto [low, high] = std::ranges::minmax_element(log, {}, &ServoSample::angle_rad);

@@ -11,38 +11,23 @@
 #include "alidade/detect/image_sequence.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/tables/localize_file.h"
-#include "alidade/testing/room_video.h"
+#include "alidade/testing/room_film.h"
 
 namespace alidade {
 namespace {
 
-using testing::render_room;
+using testing::localized;
 using testing::room_camera;
-using testing::room_path;
+using testing::room_film;
+using testing::RoomFilm;
 using testing::RoomScene;
 
-struct RoomVideo {
-  RoomScene scene;
-  std::vector<cv::Mat> images;
-  std::vector<TimedPose> truth;
-};
-
-RoomVideo room_video(const RoomScene& scene) {
-  RoomVideo video{scene, {}, {}};
-  for (const Rigid3& world_from_cam : room_path(scene)) {
-    const std::size_t i = video.images.size();
-    video.images.push_back(render_room(scene, world_from_cam, i + 1));
-    video.truth.push_back({static_cast<double>(i) / scene.rate_hz, world_from_cam});
-  }
-  return video;
-}
-
 /// The same images serve several tests.
-const RoomVideo& usual_room() {
-  static const RoomVideo video = [] {
+const RoomFilm& usual_room() {
+  static const RoomFilm video = [] {
     RoomScene scene;
     scene.camera = room_camera();
-    return room_video(scene);
+    return room_film(scene);
   }();
   return video;
 }
@@ -55,18 +40,6 @@ LocalizeConfig by_hand() {
   return config;
 }
 
-Localization localized(const RoomVideo& video, const LocalizeConfig& config) {
-  std::size_t i = 0;
-  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
-    if (i == video.images.size()) return false;
-    grey = video.images[i];
-    frame = static_cast<long>(i);
-    t_s = static_cast<double>(i++) / video.scene.rate_hz;
-    return true;
-  };
-  return localize(ImageStream{next, video.images.size()}, video.scene.camera, config, video.truth);
-}
-
 TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
   const Localization report = localized(usual_room(), by_hand());
   EXPECT_EQ(report.num_lost, 0u);
@@ -77,7 +50,7 @@ TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
 }
 
 /// Four in ten matches moved by up to 20 px, or taken away.
-Localization disturbed(const RoomVideo& video, bool takes_away, std::uint64_t seed) {
+Localization disturbed(const RoomFilm& video, bool takes_away, std::uint64_t seed) {
   LocalizeConfig config = by_hand();
   Draws draws(seed);
   config.disturb = [&](long, std::vector<FeatureObservation>& observations) {
@@ -102,7 +75,7 @@ TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
     RoomScene scene;
     scene.camera = room_camera();
     scene.amplitude = amplitude;
-    const RoomVideo video = amplitude == 1.0 ? usual_room() : room_video(scene);
+    const RoomFilm video = amplitude == 1.0 ? usual_room() : room_film(scene);
     clean2 += std::pow(localized(video, by_hand()).error.ate_m, 2);
     for (std::uint64_t seed = 1; seed <= num_draws; ++seed) {
       const Localization wrong = disturbed(video, false, seed);
@@ -120,7 +93,7 @@ TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
 }
 
 TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {
-  RoomVideo video = usual_room();
+  RoomFilm video = usual_room();
   for (std::size_t i = 40; i < 70; ++i)
     video.images[i] = cv::Mat(240, 320, CV_8U, cv::Scalar(0));  // zeros() would write into the shared one
   const Localization report = localized(video, by_hand());
@@ -137,7 +110,7 @@ TEST(LocalizeImages, WithoutTheTargetThereIsNoPath) {
   scene.camera = room_camera();
   scene.has_rectangle = false;
   scene.num_frames = 5;
-  const Localization report = localized(room_video(scene), by_hand());
+  const Localization report = localized(room_film(scene), by_hand());
   EXPECT_EQ(report.num_lost, 5u);
   EXPECT_EQ(report.verdict.exit_code, ExitCode::undetermined);
 }
@@ -163,7 +136,7 @@ cv::Mat sheets_at(const Camera& camera, const std::vector<double>& places_m) {
 
 /// Two sheets that look the same: a path from the wrong one would be a wrong path with a small σ.
 TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
-  RoomVideo video = usual_room();
+  RoomFilm video = usual_room();
   video.images.assign(5, sheets_at(video.scene.camera, {-0.2, 0.2}));
   const Localization two = localized(video, by_hand());
   EXPECT_EQ(two.num_lost, 5u);
@@ -179,7 +152,7 @@ TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
 TEST(LocalizeImages, FindsPointsByTheirPatches) {
   LocalizeConfig config = by_hand();
   config.target.rectangle_m.reset();
-  const RoomVideo& video = usual_room();
+  const RoomFilm& video = usual_room();
   constexpr int side = 31;
   for (const KnownPoint& point : config.target.points) {
     const auto px = project(video.scene.camera, video.truth[0].world_from_cam.inverse() * point.point_in_world);
@@ -208,8 +181,8 @@ TEST(LocalizeImages, ReinitialisesWhereItsObservationsContradictIt) {
   }
 }
 
-RoomVideo with_focal_length(double share) {
-  RoomVideo video = usual_room();
+RoomFilm with_focal_length(double share) {
+  RoomFilm video = usual_room();
   Params<KannalaBrandt> values = std::get<Calibrated<KannalaBrandt>>(video.scene.camera.lens).params;
   values.head<2>() *= share;
   video.scene.camera.lens = Calibrated<KannalaBrandt>{values};
@@ -239,7 +212,7 @@ TEST(LocalizeImages, AWrongLensIsCorrectedAndNamed) {
 }
 
 TEST(LocalizeImages, WithoutTextureThereIsNoPath) {
-  RoomVideo video = usual_room();
+  RoomFilm video = usual_room();
   video.images.resize(10);
   for (cv::Mat& image : video.images) image = cv::Mat(240, 320, CV_8U, cv::Scalar(128));
   LocalizeConfig config = by_hand();

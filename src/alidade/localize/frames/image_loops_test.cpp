@@ -9,24 +9,19 @@
 #include "alidade/localize.h"
 #include "alidade/localize/frames/landmark_descriptions.h"
 #include "alidade/patches/corner_features.h"
-#include "alidade/testing/room_video.h"
+#include "alidade/testing/room_film.h"
 
 // Places that a camera comes back to are recognised in its images, and the path is solved with that.
 
 namespace alidade {
 namespace {
 
+using testing::RoomFilm;
 using testing::RoomScene;
 
-struct WallFilm {
-  RoomScene scene;
-  std::vector<cv::Mat> images;
-  std::vector<TimedPose> truth;
-};
-
 /// Along a wall, 1.2 m before it: so many metres, and back in as many images as on the way.
-WallFilm along_wall(double length_m, double num_there, std::size_t num, long num_columns) {
-  WallFilm film;
+RoomFilm along_wall(double length_m, double num_there, std::size_t num, long num_columns) {
+  RoomFilm film;
   film.scene.camera = testing::room_camera();
   film.scene.has_rectangle = false;
   film.scene.num_columns = num_columns;
@@ -37,29 +32,20 @@ WallFilm along_wall(double length_m, double num_there, std::size_t num, long num
     const Rigid3 world_from_cam{
         exp_so3(Eigen::Vector3d(0.03 * std::sin(37.0 * t), 0.05 * std::sin(29.0 * t), 0.02 * std::sin(23.0 * t))),
         position};
-    film.images.push_back(testing::render_room(film.scene, world_from_cam, i + 1));
-    film.truth.push_back({static_cast<double>(i) / film.scene.rate_hz, world_from_cam});
+    film.take(i, world_from_cam);
   }
   return film;
 }
 
-Localization localized(const WallFilm& film) {
+LocalizeConfig with_few_landmarks() {
   LocalizeConfig config;
   config.features.max_features = 60;  // the map is full after two metres
-  std::size_t i = 0;
-  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
-    if (i == film.images.size()) return false;
-    grey = film.images[i];
-    frame = static_cast<long>(i);
-    t_s = film.truth[i++].t_s;
-    return true;
-  };
-  return localize(ImageStream{next, film.images.size()}, film.scene.camera, config, film.truth);
+  return config;
 }
 
 TEST(ImageLoops, WhereTheCameraComesBackThePathCloses) {
-  const WallFilm film = along_wall(3.2, 120.0, 240, 0);
-  const Localization report = localized(film);
+  const RoomFilm film = along_wall(3.2, 120.0, 240, 0);
+  const Localization report = localized(film, with_few_landmarks());
   EXPECT_TRUE(report.is_smoothed);
   EXPECT_GE(report.num_loops, 1u);
   EXPECT_EQ(report.num_lost, 0u);
@@ -73,8 +59,8 @@ TEST(ImageLoops, WhereTheCameraComesBackThePathCloses) {
 
 /// A wall that repeats itself after .8 m is no place come back to.
 TEST(ImageLoops, AlikePlacesAreNotTakenForOne) {
-  const WallFilm film = along_wall(4.8, 240.0, 240, 18);
-  const Localization report = localized(film);
+  const RoomFilm film = along_wall(4.8, 240.0, 240, 18);
+  const Localization report = localized(film, with_few_landmarks());
   EXPECT_TRUE(report.is_smoothed);
   EXPECT_EQ(report.num_loops, 0u);
   EXPECT_GE(report.num_loops_rejected, 1u);

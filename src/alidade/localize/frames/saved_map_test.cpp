@@ -8,7 +8,7 @@
 #include "alidade/localize.h"
 #include "alidade/tables/map_file.h"
 #include "alidade/testing/long_walk.h"
-#include "alidade/testing/room_video.h"
+#include "alidade/testing/room_film.h"
 
 // A map that one run leaves is where another begins.
 
@@ -16,6 +16,7 @@ namespace alidade {
 namespace {
 
 using testing::LongWalk;
+using testing::RoomFilm;
 using testing::RoomScene;
 
 /// The map by way of its file.
@@ -27,39 +28,19 @@ SavedMap as_written(const SavedMap& map) {
   return read;
 }
 
-struct MapFilm {
-  RoomScene scene;
-  std::vector<cv::Mat> images;
-  std::vector<TimedPose> truth;
-};
-
 /// The room without its rectangle looks the same everywhere else.
-MapFilm map_film(bool has_rectangle, int from, int to) {
-  MapFilm film;
-  film.scene.camera = testing::room_camera();
-  film.scene.num_frames = to;
-  film.scene.has_rectangle = has_rectangle;
-  const std::vector<Rigid3> path = testing::room_path(film.scene);
-  for (int i = from; i < to; ++i) {
-    const Rigid3& pose = path[static_cast<std::size_t>(i)];
-    film.images.push_back(testing::render_room(film.scene, pose, static_cast<std::uint64_t>(i + 1)));
-    film.truth.push_back({i / film.scene.rate_hz, pose});
-  }
-  return film;
+RoomFilm map_film(bool has_rectangle, int from, int to) {
+  RoomScene scene;
+  scene.camera = testing::room_camera();
+  scene.num_frames = to;
+  scene.has_rectangle = has_rectangle;
+  return testing::room_film(scene, static_cast<std::size_t>(from));
 }
 
-Localization localized_film(const MapFilm& film, LocalizeConfig config) {
+Localization localized_film(const RoomFilm& film, LocalizeConfig config) {
   config.filter.sigma_a_m_s2 = 4.0;
   config.filter.sigma_alpha_rad_s2 = 6.0;
-  std::size_t i = 0;
-  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
-    if (i == film.images.size()) return false;
-    grey = film.images[i];
-    frame = static_cast<long>(i);
-    t_s = film.truth[i++].t_s;
-    return true;
-  };
-  return localize(ImageStream{next, film.images.size()}, film.scene.camera, config, film.truth);
+  return testing::localized(film, config);
 }
 
 TEST(SavedMap, ImagesBeginInTheMapOfAnEarlierRun) {
@@ -83,7 +64,7 @@ TEST(SavedMap, ImagesOfAnotherPlaceAreRefused) {
   LocalizeConfig with_target, in_map;
   with_target.target = rectangle_target(0.210, 0.1485);
   in_map.map = localized_film(map_film(true, 0, 45), with_target).saved_map;
-  MapFilm elsewhere = map_film(true, 0, 5);
+  RoomFilm elsewhere = map_film(true, 0, 5);
   for (cv::Mat& image : elsewhere.images) cv::flip(image, image, -1);
   const Localization none = localized_film(elsewhere, in_map);
   EXPECT_EQ(none.num_lost, 5u);

@@ -7,30 +7,20 @@
 
 #include "alidade/localize.h"
 #include "alidade/patches/reference_patch.h"
-#include "alidade/testing/room_video.h"
+#include "alidade/testing/room_film.h"
 
 namespace alidade {
 namespace {
 
+using testing::RoomFilm;
 using testing::RoomScene;
 
-struct MarkedFilm {
+RoomFilm marked_film(int num_frames) {
   RoomScene scene;
-  std::vector<cv::Mat> images;
-  std::vector<TimedPose> truth;
-};
-
-MarkedFilm marked_film(int num_frames) {
-  MarkedFilm film;
-  film.scene.camera = testing::room_camera();
-  film.scene.num_frames = num_frames;
-  film.scene.amplitude = 1.4;
-  for (const Rigid3& pose : testing::room_path(film.scene)) {
-    const std::size_t i = film.images.size();
-    film.images.push_back(testing::render_room(film.scene, pose, i + 1));
-    film.truth.push_back({static_cast<double>(i) / film.scene.rate_hz, pose});
-  }
-  return film;
+  scene.camera = testing::room_camera();
+  scene.num_frames = num_frames;
+  scene.amplitude = 1.4;
+  return testing::room_film(scene);
 }
 
 /// Digits that change, and a frame around the image that does not.
@@ -40,25 +30,17 @@ void burn_in(cv::Mat& image, std::size_t i) {
   cv::putText(image, "CAM 1 DEPTH 12.4m", {60, 24}, cv::FONT_HERSHEY_SIMPLEX, 0.7, cv::Scalar(255), 2);
 }
 
-Localization localized_marked(const MarkedFilm& film, bool masks_still) {
+Localization localized_marked(const RoomFilm& film, bool masks_still) {
   LocalizeConfig config;
   config.filter.sigma_a_m_s2 = 4.0;
   config.filter.sigma_alpha_rad_s2 = 6.0;
   config.target = rectangle_target(0.210, 0.1485);
   config.masks_still = masks_still;
-  std::size_t i = 0;
-  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
-    if (i == film.images.size()) return false;
-    grey = film.images[i];
-    frame = static_cast<long>(i);
-    t_s = film.truth[i++].t_s;
-    return true;
-  };
-  return localize(ImageStream{next, film.images.size()}, film.scene.camera, config, film.truth);
+  return testing::localized(film, config);
 }
 
 TEST(StillParts, WhatIsBurntInIsMaskedAndTheSceneIsNot) {
-  MarkedFilm with = marked_film(60);
+  RoomFilm with = marked_film(60);
   StillParts of_scene, of_both;
   for (std::size_t i = 0; i < with.images.size(); ++i) {
     (void)of_scene.add(smoothed_for_search(with.images[i]));
@@ -78,7 +60,7 @@ TEST(StillParts, WhatIsBurntInIsMaskedAndTheSceneIsNot) {
 
 /// While the camera stands everything stands: nothing is masked.
 TEST(StillParts, ACameraThatStandsMasksNothing) {
-  MarkedFilm still = marked_film(1);
+  RoomFilm still = marked_film(1);
   StillParts parts;
   for (std::uint64_t i = 0; i < 60; ++i)
     (void)parts.add(smoothed_for_search(testing::render_room(still.scene, still.truth[0].world_from_cam, i + 1)));
@@ -86,7 +68,7 @@ TEST(StillParts, ACameraThatStandsMasksNothing) {
 }
 
 TEST(StillParts, APathIsAsGoodWithAClockBurntIn) {
-  MarkedFilm with = marked_film(120);
+  RoomFilm with = marked_film(120);
   const Localization clean = localized_marked(with, false), masked_clean = localized_marked(with, true);
   EXPECT_LT(masked_clean.still_share, 0.001);
   EXPECT_LT(masked_clean.error.ate_m, 1.3 * clean.error.ate_m);  // a feature or two are chosen elsewhere

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <numbers>
 
 #include "alidade/pantilt/intrinsics_history.h"
@@ -54,6 +55,12 @@ double step_of(const ServoLogScene& scene, double t_s) {
   if (t_s < scene.step_at_s || scene.steps.empty()) return 0.0;
   const auto done = static_cast<std::size_t>((t_s - scene.step_at_s) / scene.hold_s + 1e-9);
   return scene.steps[done % scene.steps.size()];
+}
+
+double command_of(const ServoLogScene& scene, double t_s) {
+  if (!scene.is_chirp) return scene.amplitude * step_of(scene, t_s);
+  const double sweep_hz = scene.low_hz + 0.5 * (scene.high_hz - scene.low_hz) * t_s / scene.duration_s;
+  return scene.amplitude * std::sin(2.0 * std::numbers::pi * sweep_hz * t_s);
 }
 
 }  // namespace
@@ -160,21 +167,30 @@ std::optional<Eigen::Vector2d> SimulatedHead::seen_pixel(const Eigen::Vector3d& 
 
 std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uint64_t seed) {
   Draws draws(seed);
-  DelayedAxis axis(scene.axis, {});
+  // Commands wait here: a DelayedAxis has room for a few only.
+  ServoAxis prompt = scene.axis;
+  prompt.command_delay_s = 0.0;
+  DelayedAxis axis(prompt, {});
+  std::deque<ServoLogRow> waiting;
   std::vector<ServoLogRow> rows;
   const int num_rows = static_cast<int>(std::floor(scene.duration_s * scene.rate_hz)) + 1;
   for (int k = 0; k < num_rows; ++k) {
     ServoLogRow row;
     row.t_s = k / scene.rate_hz;
-    const double sweep_hz = scene.low_hz + 0.5 * (scene.high_hz - scene.low_hz) * row.t_s / scene.duration_s;
-    const double wave =
-        scene.is_chirp ? std::sin(2.0 * std::numbers::pi * sweep_hz * row.t_s) : step_of(scene, row.t_s);
-    row.command = scene.amplitude * wave;
+    row.command = command_of(scene, row.t_s);
     row.angle_rad =
         rounded_to(scene.zero_rad + axis.motion().angle_rad + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
     rows.push_back(row);
-    axis.send(row.command);
-    axis.advance(1.0 / scene.rate_hz);
+    waiting.push_back(row);
+    const double next_s = (k + 1) / scene.rate_hz;
+    double now_s = row.t_s;
+    for (; !waiting.empty() && waiting.front().t_s + scene.axis.command_delay_s <= next_s; waiting.pop_front()) {
+      const double acts_s = std::max(now_s, waiting.front().t_s + scene.axis.command_delay_s);
+      axis.advance(acts_s - now_s);
+      axis.send(waiting.front().command);
+      now_s = acts_s;
+    }
+    axis.advance(next_s - now_s);
   }
   return rows;
 }

@@ -75,12 +75,22 @@ Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
   return clock;
 }
 
-/// Assumptions. By definition: angles are the encoder's own radians, and a command is valid from its own time on.
+/// A command is valid from its own time on: by definition, or, of commands between rows, within a row.
+Assumption assumed_offset(const ServoIdentification& identified) {
+  const double sigma_s = identified.sigma_command_s;
+  Assumption offset{.name = "command_offset_s", .value = 0.0, .sigma = sigma_s, .moved = "latency_s"};
+  if (sigma_s == 0.0) return offset;
+  offset.moved_by = sigma_s;
+  offset.moves = sigma_s / std::sqrt(identified.fit.cov(ServoParam::latency, ServoParam::latency));
+  return offset;
+}
+
+/// Assumptions. By definition: angles are the encoder's own radians.
 std::vector<Assumption> assumed_of(const Identification& identified, double sigma_clock) {
   const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
                                      assumed_clock(identified.fit, sigma_clock),
-                                     {.name = "command_offset_s", .value = 0.0, .sigma = 0.0, .moved = "latency_s"}};
+                                     assumed_offset(identified)};
   if (identified.encoder_wraps > 0)
     assumed.push_back({.name = "encoder_turn_rad", .value = 2.0 * std::numbers::pi, .sigma = 0.0, .moved = "gain_rad"});
   for (const CountedFlaw& counted : identified.counted) {

@@ -120,6 +120,9 @@ struct ServoIdentification {
   double sigma_time_score = 0.0;     ///< Of it, in σ.
   double encoder_hz = 0.0;           ///< It is sampled so often and held between: half a period is in the latency.
   std::vector<double> sampled_t_s;   ///< Of each row, then.
+  std::vector<double> command_t_s;   ///< Where commands were given before their rows: each row's, as estimated.
+  std::size_t num_command_times = 0;
+  double sigma_command_s = 0.0;  ///< Of what all of them may have been given earlier, which no log shows; in the σ.
   double lag_one_correlation = 0.0;  ///< Of the residuals, one row to the next: near 0 where the model is enough.
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };

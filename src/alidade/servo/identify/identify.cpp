@@ -261,6 +261,66 @@ ServoIdentification::Status status_of(const ServoFit& fit) {
   return fit.has_converged ? ServoIdentification::Status::converged : ServoIdentification::Status::not_converged;
 }
 
+/// Both kinds of plant, with what else the log shows of them.
+struct Solution {
+  std::vector<ServoSample> log;  ///< With the commands' times.
+  std::array<ServoFit, 2> fits;
+  std::array<std::vector<ServoRival>, 2> rivals;
+  std::size_t believed = 0;
+  std::optional<CommandTimes> times;
+
+  [[nodiscard]] const ServoFit& fit() const { return fits[believed]; }
+};
+
+Solution with_flaws_tried(std::vector<ServoSample> log, const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
+  Solution solution{std::move(log), fits, {}, 0, std::nullopt};
+  // Where one kind explains the log as it is, the other is not made to.
+  const std::vector<std::size_t> tried = indicated_flaws(solution.log, fits[believed_of(fits, rule)]);
+  for (std::size_t kind = 0; kind < 2 && !tried.empty(); ++kind)
+    solution.fits[kind] = with_flaws(solution.log, fits[kind], tried, solution.rivals[kind]);
+  solution.believed = believed_of(solution.fits, rule);
+  return solution;
+}
+
+/// 2 ln of the likelihood ratio of a fit with flaws against another, less Schwarz's price of them.
+double evidence_of_flaws(double rows, const ServoFit& plain, const ServoFit& flawed) {
+  return 2.0 * rows * std::log(plain.rms_rad / flawed.rms_rad) -
+         static_cast<double>(flawed.freed.size()) * std::log(rows);
+}
+
+/// As logged; or with commands that were given before their rows, if they explain more than flaws of the axis do.
+Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s, ServoKindRule rule) {
+  const std::vector<ServoSample> log = sampled_log(as_read, sampled_t_s);
+  const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle)),
+                                     refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
+  Solution as_logged = with_flaws_tried(log, fits, rule);
+  const std::array<std::optional<CommandTimes>, 2> times{command_times(log, fits[0]), command_times(log, fits[1])};
+  std::array<ServoFit, 2> earlier = fits;
+  for (std::size_t kind = 0; kind < 2; ++kind)
+    if (times[kind]) earlier[kind] = times[kind]->fit;
+  const std::size_t kind = believed_of(earlier, rule);
+  if (!times[kind]) return as_logged;
+  const std::vector<ServoSample> timed = sampled_log(as_read, sampled_t_s, times[kind]->given_t_s);
+  for (std::size_t i = 0; i < 2; ++i) earlier[i] = refined(timed, earlier[i].kind, earlier[i].params);
+  Solution with_times = with_flaws_tried(timed, earlier, rule);
+  if (with_times.believed != kind) return as_logged;
+  with_times.times = times[kind];
+  const double rows = static_cast<double>(readings_of(log).size());
+  const double of_times = times[kind]->evidence + evidence_of_flaws(rows, earlier[kind], with_times.fit());
+  return of_times > evidence_of_flaws(rows, fits[kind], as_logged.fit()) ? with_times : as_logged;
+}
+
+void count_command_times(std::span<const ServoSample> log, const std::optional<CommandTimes>& times,
+                         ServoIdentification& result) {
+  if (times) {
+    result.command_t_s = times->given_t_s;
+    result.num_command_times = times->num;
+    result.fit.cov += times->cov_added;
+  }
+  result.sigma_command_s = times ? times->sigma_offset_s : sigma_of_drifting_commands(log, result.fit);
+  result.fit.cov(ServoParam::latency, ServoParam::latency) += result.sigma_command_s * result.sigma_command_s;
+}
+
 }  // namespace
 
 ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKindRule rule) {
@@ -276,18 +336,11 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
     result.encoder_hz = 1.0 / held->sampling.period_s;
     result.sampled_t_s = sampled_times(as_read, held->sampling);
   }
-  const std::vector<ServoSample> log = sampled_log(as_read, result.sampled_t_s);
-  std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle)),
-                               refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
-  std::array<std::vector<ServoRival>, 2> rivals;
-  // Where one kind explains the log as it is, the other is not made to.
-  const std::vector<std::size_t> tried = indicated_flaws(log, fits[believed_of(fits, rule)]);
-  for (std::size_t kind = 0; kind < 2 && !tried.empty(); ++kind)
-    fits[kind] = with_flaws(log, fits[kind], tried, rivals[kind]);
-  const std::size_t believed = believed_of(fits, rule);
-  result.fit = fits[believed];
-  result.other = fits[1 - believed];
-  result.rivals = rivals[believed];
+  const Solution found = solved(as_read, result.sampled_t_s, rule);
+  const std::vector<ServoSample>& log = found.log;
+  result.fit = found.fit();
+  result.other = found.fits[1 - found.believed];
+  result.rivals = found.rivals[found.believed];
   const bool is_plain = result.fit.freed.empty();
   const ServoResponse response = servo_response(log, result.fit.kind, result.fit.params);
   const Eigen::VectorXd residuals =
@@ -299,6 +352,7 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
   constexpr std::size_t several = 2;
   if (num_sizes(log, several) < several && result.fit.is_observable) result.hidden = hidden_flaws(log, result.fit);
   if (held) count_by_row(log, held->sigma_phase_s, result);
+  count_command_times(as_read, found.times, result);
   return result;
 }
 

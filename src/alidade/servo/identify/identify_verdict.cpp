@@ -21,6 +21,15 @@ Verdict refused(std::string what, std::string add) {
   return verdict;
 }
 
+std::string command_times_text(const ServoIdentification& identified) {
+  const std::string text = text_of(static_cast<double>(identified.num_command_times), 3);
+  if (!(identified.sigma_command_s > 0.0))
+    return text + " commands were given at rows that are lost: when is estimated, and counted in σ";
+  return text +
+         " commands were given before their rows, between two or where rows are lost: when is estimated, but for " +
+         text_of(1e3 * identified.sigma_command_s, 2) + " ms (σ) of the latency";
+}
+
 void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const double correlation = identified.lag_one_correlation, rows = static_cast<double>(reading_times(log).size());
@@ -54,6 +63,15 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
                                   " times a second: each sample counts once, and the latency includes half of the time "
                                   "between two",
                               identified.encoder_hz, 0.0, "Hz", ""});
+  if (identified.num_command_times > 0)
+    verdict.checks.push_back({"command times", State::good, command_times_text(identified),
+                              static_cast<double>(identified.num_command_times), 0.0, "commands", ""});
+  if (identified.num_command_times == 0 && identified.sigma_command_s > 0.0)
+    verdict.checks.push_back(
+        {"command times", State::care,
+         "the clocks' drift is within a row by the end of the log, as of commands at a regular spacing that are given "
+         "between rows: then the latency is up to a row longer; log when commands are given (command_t_s)",
+         identified.duration_s * std::abs(fit.flaws.clock_rate), identified.sigma_command_s, "s", ""});
   if (!fit.has_converged)
     verdict.checks.push_back({"convergence", State::care, "the fit was still moving", 0.0, 0.0, "1", ""});
 }
@@ -212,7 +230,7 @@ Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& 
 }  // namespace
 
 Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified) {
-  return verdict_of(sampled_log(log, identified.sampled_t_s), identified);
+  return verdict_of(sampled_log(log, identified.sampled_t_s, identified.command_t_s), identified);
 }
 
 }  // namespace alidade

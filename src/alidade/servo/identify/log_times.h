@@ -1,6 +1,10 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "alidade/servo/identify/identify.h"
 
@@ -21,5 +25,24 @@ inline constexpr double sigmas_of_time_stamps = 3.0;
 /// R. Koenker, "A note on studentizing a test for heteroscedasticity", 1981.
 void count_time_stamps(std::span<const ServoSample> log, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse,
                        ServoIdentification& result);
+
+/// A log of commands that were given before their rows: between rows, or at one that was lost.
+struct CommandTimes {
+  ServoFit fit;                       ///< Of the plain model, with them.
+  std::vector<double> given_t_s;      ///< ServoSample::command_t_s of each row; NaN: at the row.
+  std::size_t num = 0;                ///< Of times that were estimated.
+  decltype(ServoFit::cov) cov_added;  ///< What they leave open of the parameters.
+  double evidence = 0.0;              ///< 2 ln of the likelihood ratio, with the times integrated over.
+  double sigma_offset_s = 0.0;        ///< Of what all commands together may have been given earlier.
+};
+/// When each command that changes was given, evenly distributed since the row before it (or since the first of the rows
+/// that were lost there) and estimated with the parameters; none where the evidence is not above 12, or there are more
+/// than 60. How commands lie between rows a log does not show: all of them may be up to a row earlier.
+[[nodiscard]] std::optional<CommandTimes> command_times(std::span<const ServoSample> log, const ServoFit& fit);
+
+/// Commands at a regular spacing that is no multiple of the rows' lie a little further from their rows each time: a
+/// drift of clocks, as far as the log goes. The σ of what they were all given earlier, if the clocks' drift through the
+/// log is within a row (and 3σ); 0 where it is not, or the log has the commands' times.
+[[nodiscard]] double sigma_of_drifting_commands(std::span<const ServoSample> log, const ServoFit& fit);
 
 }  // namespace alidade

@@ -124,6 +124,92 @@ TEST(ServoLogTimes, StampsThatErrAreCounted) {
   EXPECT_LE(num_clean_seen, 1 + draws / 25);
 }
 
+/// How the commands of a log lie to its rows.
+enum class Commanded { at_rows, at_rows_that_are_lost, between_rows, at_rows_or_half_between };
+
+/// The rows at 100 Hz of an axis that is simulated at 1000 Hz, commanded in steps of its own spacing. Of the rows
+/// that are lost there are three in ten.
+std::vector<ServoSample> commanded_log(ServoLogScene scene, Commanded how, std::uint64_t seed) {
+  constexpr int per_row = 10;
+  Draws draws(seed);
+  const double rows_held = std::round(draws.uniform(30.0, 50.0));
+  const bool is_half = how == Commanded::at_rows_or_half_between;
+  scene.rate_hz = 1000.0;
+  scene.duration_s = 5.0;
+  scene.step_at_s = how == Commanded::between_rows ? 1e-3 * std::round(draws.uniform(480.0, 520.0)) : 0.5;
+  // Of a spacing of whole rows commands would all lie alike, which no log shows.
+  scene.hold_s = 1e-2 * (rows_held + (is_half ? 0.5 : how == Commanded::between_rows ? 0.3 : 0.0));
+  std::vector<ServoSample> rows;
+  const std::vector<ServoSample> log = log_of(scene, seed);
+  for (std::size_t i = 0; i < log.size(); i += per_row)
+    if (how != Commanded::at_rows_that_are_lost || i == 0 || draws.uniform(0.0, 1.0) > 0.3) rows.push_back(log[i]);
+  return rows;
+}
+
+/// Limits, dead bands and clocks were estimated in place of such times, and latencies 8σ off. How commands lie between
+/// rows is not known: a latency within a row.
+TEST(ServoLogTimes, CommandsBeforeTheirRowsAreEstimated) {
+  const auto draws = static_cast<std::uint64_t>(testing::trials(1));
+  int good = 0, runs = 0;
+  double sum2 = 0.0;
+  for (const Commanded how :
+       {Commanded::at_rows_that_are_lost, Commanded::between_rows, Commanded::at_rows_or_half_between}) {
+    for (const bool is_rate_plant : {false, true}) {
+      for (std::uint64_t seed = 1; seed <= draws; ++seed, ++runs) {
+        const ServoLogScene scene = late_scene(is_rate_plant);
+        const Identification identified = identify(commanded_log(scene, how, seed));
+        good += identified.verdict.state == State::good ? 1 : 0;
+        EXPECT_TRUE(identified.fit.freed.empty()) << static_cast<int>(how) << is_rate_plant << seed;
+        EXPECT_GT(identified.num_command_times, 0u) << static_cast<int>(how) << is_rate_plant << seed;
+        for (int param = 0; param < 3; ++param) {
+          const double z = error_in_sigma(identified.fit, scene, param);
+          sum2 += z * z;
+          EXPECT_LT(std::abs(z), 5.0) << static_cast<int>(how) << is_rate_plant << seed << param;
+        }
+        EXPECT_EQ(identified.assumed[2].sigma, identified.sigma_command_s);
+      }
+    }
+  }
+  EXPECT_GE(good, runs - (runs + 9) / 10) << "of " << runs;
+  EXPECT_LT(sum2 / (3.0 * runs), 1.0 + 5.0 * std::sqrt(2.0 / (3.0 * runs)));
+}
+
+/// Each command a little further from its row than the one before: a drift of clocks, as far as the log goes, with a
+/// latency a row short (118σ at a good verdict).
+TEST(ServoLogTimes, CommandsThatDriftBetweenRowsAreNoClockForSure) {
+  for (const bool is_rate_plant : {false, true}) {
+    ServoLogScene scene = late_scene(is_rate_plant);
+    scene.rate_hz = 1000.0;
+    scene.duration_s = 9.0;
+    scene.step_at_s = 0.491;
+    scene.hold_s = 0.901;
+    std::vector<ServoSample> rows;
+    const std::vector<ServoSample> log = log_of(scene);
+    for (std::size_t i = 0; i < log.size(); i += 10) rows.push_back(log[i]);
+    const Identification identified = identify(rows);
+    ASSERT_EQ(std::ranges::count(identified.fit.freed, ServoFlaw::clock_rate), 1);
+    EXPECT_EQ(identified.verdict.state, State::care);
+    EXPECT_NE(identified.verdict.sentence.find("between rows"), std::string::npos) << identified.verdict.sentence;
+    for (int param = 0; param < 3; ++param) EXPECT_LT(std::abs(error_in_sigma(identified.fit, scene, param)), 3.0);
+    // Clocks that drift by several rows are clocks.
+    std::vector<ServoSample> drifted = log_of(late_scene(is_rate_plant));
+    for (ServoSample& row : drifted) row.command_t_s = row.t_s, row.t_s *= 1.001;
+    EXPECT_EQ(identify(drifted).sigma_command_s, 0.0);
+  }
+}
+
+/// Commands at rows are not moved: the numbers are those of the plain model.
+TEST(ServoLogTimes, CommandsAtRowsStayThere) {
+  const auto draws = static_cast<std::uint64_t>(testing::trials(3));
+  for (const bool is_rate_plant : {false, true}) {
+    for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+      const Identification identified = identify(commanded_log(late_scene(is_rate_plant), Commanded::at_rows, seed));
+      EXPECT_EQ(identified.num_command_times, 0u) << is_rate_plant << seed;
+      EXPECT_EQ(identified.sigma_command_s, 0.0);
+    }
+  }
+}
+
 /// An encoder that begins again at half a turn: unwrapped, and said.
 TEST(ServoLogTimes, AnEncoderThatBeginsAgainIsUnwrapped) {
   for (const bool is_rate_plant : {false, true}) {

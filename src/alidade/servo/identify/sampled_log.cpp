@@ -178,8 +178,10 @@ std::vector<double> sampled_times(std::span<const ServoSample> log, const Encode
   return times_s;
 }
 
-std::vector<ServoSample> sampled_log(std::span<const ServoSample> log, const std::vector<double>& sampled_t_s) {
+std::vector<ServoSample> sampled_log(std::span<const ServoSample> log, const std::vector<double>& sampled_t_s,
+                                     const std::vector<double>& command_t_s) {
   std::vector<ServoSample> rows(log.begin(), log.end());
+  for (std::size_t i = 0; i < command_t_s.size(); ++i) rows[i].command_t_s = command_t_s[i];
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i].sampled_t_s = sampled_t_s.empty() ? std::nan("") : sampled_t_s[i];
   return rows;

@@ -28,9 +28,11 @@ struct HeldSampling {
 /// When the sample that each row repeats was read on average: half a period after it was taken.
 [[nodiscard]] std::vector<double> sampled_times(std::span<const ServoSample> log, const EncoderSampling& sampling);
 
-/// The log with such times; none: all its rows are readings.
+/// The log with such times; none: all its rows are readings. `command_t_s`: and with these of its commands, where there
+/// are any.
 [[nodiscard]] std::vector<ServoSample> sampled_log(std::span<const ServoSample> log,
-                                                   const std::vector<double>& sampled_t_s);
+                                                   const std::vector<double>& sampled_t_s,
+                                                   const std::vector<double>& command_t_s = {});
 
 /// A value of each row from one of each reading.
 [[nodiscard]] std::vector<double> by_row(std::span<const ServoSample> log, const std::vector<double>& by_reading);

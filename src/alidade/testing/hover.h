@@ -22,6 +22,7 @@ struct Hover {
   double dt_s = 1.0 / 30.0;
   double sigma_px = 0.5, sigma_known_m = 0.001;
   double lasting = 0.0;  ///< Correlation of a point's pixel errors from frame to frame: as a drifting track has them.
+  double loose = 1.0;    ///< By which every third point's errors are larger, as of corners of two surfaces.
   double distance_m = 0.9;
   double sway = 1.0;  ///< Share of its translation: at 0 it rotates in place,
   double turn = 1.0;  ///< and of its rotation: at 0 of both it stands still.
@@ -182,6 +183,7 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
       Eigen::Vector3d point = run.points[i];
       if (i < run.target.size()) point.x() += scene.target_speed_m_s * t_s;
       const auto px = hover::seen_at(scene, lens, motion, point, t_s);
+      if (i % 3 == 0) noise *= scene.loose;
       if (px) frame.observations.push_back({static_cast<long>(i) + 1, *px + noise, 0.0});
     }
     run.frames.push_back(std::move(frame));

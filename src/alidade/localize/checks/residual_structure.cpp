@@ -50,6 +50,8 @@ std::string name_of(std::size_t part) {
   return std::string(rows[part / num_across]) + " " + columns[part % num_across];
 }
 
+double found_sigma_px(const PlacedResidual& residual) { return residual.error_factor * residual.sigma_px; }
+
 /// Correlation of what neighbours in time have, of the same point.
 void add_autocorrelation(std::span<const PlacedResidual> residuals, ResidualStructure& structure) {
   std::map<long, const PlacedResidual*> last;
@@ -57,7 +59,7 @@ void add_autocorrelation(std::span<const PlacedResidual> residuals, ResidualStru
   for (const PlacedResidual& residual : residuals) {
     const PlacedResidual*& before = last[residual.id];
     if (before != nullptr && before->frame + 1 == residual.frame) {
-      const double variance = before->sigma_px * residual.sigma_px;
+      const double variance = found_sigma_px(*before) * found_sigma_px(residual);
       products += before->residual_px.dot(residual.residual_px) / variance;
       squares += 0.5 * (before->residual_px.squaredNorm() + residual.residual_px.squaredNorm()) / variance;
       num += 2.0;
@@ -81,8 +83,8 @@ ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, 
     };
     ImagePart& part = parts[index(residual.px.y() / camera.height_px, num_down) * num_across +
                             index(residual.px.x() / camera.width_px, num_across)];
-    part.u.add(residual.id, residual.residual_px.x() / residual.sigma_px, residual.residual_px.x());
-    part.v.add(residual.id, residual.residual_px.y() / residual.sigma_px, residual.residual_px.y());
+    part.u.add(residual.id, residual.residual_px.x() / found_sigma_px(residual), residual.residual_px.x());
+    part.v.add(residual.id, residual.residual_px.y() / found_sigma_px(residual), residual.residual_px.y());
   }
   constexpr double least = 30.0;
   const bool lasts = structure.is_autocorrelated();

@@ -72,10 +72,12 @@ std::optional<SmootherProblem> flat_start(const SmootherProblem& problem) {
   return flat;
 }
 
-double cost_of(const SmoothedPath& path, double gate) {
+double cost_of(const SmoothedPath& path, double gate, CostBy by) {
   double cost = gate * static_cast<double>(path.num_dropped);
-  for (const PlacedResidual& each : path.residuals)
-    cost += each.residual_px.squaredNorm() / (each.sigma_px * each.sigma_px);
+  for (const PlacedResidual& each : path.residuals) {
+    const double sigma_px = by == CostBy::found_sigma ? each.error_factor * each.sigma_px : each.sigma_px;
+    cost += each.residual_px.squaredNorm() / (sigma_px * sigma_px);
+  }
   return cost;
 }
 

@@ -96,6 +96,43 @@ TEST(PathSmoother, WhatNothingDeterminesDoesNotEndIt) {
   }
 }
 
+/// A third of the points has errors four times as large as the others', all of them below the stated σ or near it. With
+/// equal weights the path's variance is Σσ²/n² of its points', with their own 1/Σσ⁻², a quarter of that.
+TEST(PathSmoother, APointCountsByItsOwnErrors) {
+  constexpr double usual_px = 0.15, loose = 4.0;
+  std::vector<double> of_loose;
+  double equal = 0.0, own = 0.0, num_usual = 0.0, num_enlarged = 0.0;
+  for (const std::uint64_t seed : {51u, 52u, 53u, 54u}) {
+    const double lasting = seed % 2 == 0 ? 0.5 : 0.0;
+    const HoverRun run = testing::hovering(
+        {.num_frames = 60, .num_others = 40, .sigma_px = usual_px, .lasting = lasting, .loose = loose}, seed);
+    SmootherProblem problem = problem_of(run, Eigen::Vector3d::Zero());
+    const auto path = smoothed_path(problem);
+    problem.weighs_points = false;
+    const auto by_equal = smoothed_path(problem);
+    ASSERT_TRUE(path && by_equal) << seed;
+    const auto error_of = [&](const SmoothedPath& each) {
+      return std::pow(path_error(timed(problem, each.world_from_cam), run.truth, false).ate_m, 2);
+    };
+    own += error_of(*path);
+    equal += error_of(*by_equal);
+    for (std::size_t i = 0; i < path->ids.size(); ++i) {
+      EXPECT_EQ(by_equal->error_factors[i], 1.0);
+      if (path->ids[i] % 3 == 1) {
+        of_loose.push_back(path->error_factors[i]);
+        continue;
+      }
+      num_usual += 1.0;
+      num_enlarged += path->error_factors[i] > 1.0 ? 1.0 : 0.0;
+    }
+  }
+  RecordProperty("own_over_equal", std::to_string(own / equal));
+  std::ranges::nth_element(of_loose, of_loose.begin() + static_cast<std::ptrdiff_t>(of_loose.size() / 2));
+  EXPECT_NEAR(of_loose[of_loose.size() / 2], loose, 0.2 * loose);
+  EXPECT_LT(own, 0.5 * equal);
+  EXPECT_LE(num_enlarged, 0.02 * num_usual);
+}
+
 /// A point that no lens can have seen where it is said to be gives no guess, and no crash.
 TEST(FlatStart, IsNoneWhereAPointCannotBeSupposed) {
   const HoverRun run = testing::hovering({.num_frames = 10, .num_others = 20}, 5);

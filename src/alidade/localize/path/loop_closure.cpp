@@ -262,8 +262,10 @@ class LoopCloser {
   void take(const Candidate& candidate) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const long id : candidate.ids) sum += place(id);
-    problem_.points[times_.at(candidate.ids.front()).index].point_in_world =
-        sum / static_cast<double>(candidate.ids.size());
+    SmootherPoint& first = problem_.points[times_.at(candidate.ids.front()).index];
+    first.point_in_world = sum / static_cast<double>(candidate.ids.size());
+    for (const long id : candidate.ids)
+      first.error_factor = std::max(first.error_factor, problem_.points[times_.at(id).index].error_factor);
     for (std::size_t i = 1; i < candidate.ids.size(); ++i) joined_[candidate.ids[i]] = candidate.ids.front();
   }
 

@@ -34,7 +34,7 @@ std::optional<PathSmoother::ObservationRows> PathSmoother::rows_of(const Smoothe
   feature.values.head<3>() = state.points[point_of_[i]];
   const auto view = expected_view(state.camera, state.poses[observation.frame], feature);
   if (!view) return std::nullopt;
-  const double weight = 1.0 / observation.sigma_px;
+  const double weight = 1.0 / (error_factors_[point_of_[i]] * observation.sigma_px);
   ObservationRows rows{weight * (view->px - observation.px), weight * view->J_px_pose,
                        weight * view->J_px_feature.leftCols<3>(), GivenRows::Zero(2, num_estimated_)};
   if (has_given)
@@ -161,16 +161,23 @@ std::vector<PlacedResidual> PathSmoother::placed_residuals() const {
     const UsedObservation& observation = observations_[i];
     const auto px = project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point_of_[i]]);
     if (!px) continue;
-    residuals.push_back(
-        {observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px});
+    residuals.push_back({observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px,
+                         error_factors_[point_of_[i]]});
   }
   return residuals;
 }
 
-/// Where errors last, the path is solved again with what is new of each. False where that cannot be.
+/// Where some points' errors are larger than others', or errors last, the path is solved again with the former's own σ,
+/// and with what is new of each error. False where that cannot be.
 bool PathSmoother::heed_colour() {
   constexpr double most = 0.98;
+  constexpr double roughly = 0.3;
+  constexpr int max_weighed = 2;
   structure_ = residual_structure(placed_residuals(), state_.camera);
+  for (int i = 0; i < max_weighed && weigh_points(); ++i) {
+    if (!settle(roughly) || (choose_observations() && !settle(roughly))) return false;
+    structure_ = residual_structure(placed_residuals(), state_.camera);
+  }
   if (structure_.is_autocorrelated()) link_observations(std::min(structure_.autocorrelation, most));
   return settle();
 }

@@ -20,12 +20,14 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     index_of_[problem.points[i].id] = i;
     state_.points.push_back(problem.points[i].point_in_world);
+    error_factors_.push_back(problem.points[i].error_factor);
     if (!problem.points[i].given_in_world) continue;
     target_centre_ += *problem.points[i].given_in_world;
     num_given += 1.0;
   }
   if (num_given > 0.0) target_centre_ /= num_given;
   mid_s_ = 0.5 * (problem.t_s.front() + problem.t_s.back());
+  usual_variance_ = problem.usual_variance;
   state_.camera = problem.camera;
   state_.poses = problem.world_from_cam;
   given_lens_ = params(problem.camera.lens);
@@ -172,8 +174,7 @@ bool PathSmoother::choose_observations() {
     next += was_there ? 1 : 0;
     if (point == index_of_.end()) continue;
     const auto px = project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]);
-    const bool fits = px && (*px - observation.px).squaredNorm() <=
-                                problem_.filter.gate * observation.sigma_px * observation.sigma_px;
+    const bool fits = px && (*px - observation.px).squaredNorm() <= gate_of(observation, point->second);
     is_other = is_other || fits != was_there;
     if (!fits) continue;
     chosen.push_back(observation);
@@ -253,7 +254,9 @@ void PathSmoother::fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath&
     path.points.push_back(state_.points[i]);
     path.point_covs.push_back(covs[i]);
     path.ids.push_back(problem_.points[i].id);
+    path.error_factors.push_back(error_factors_[i]);
   }
+  path.usual_variance = usual_variance_;
   path.residuals = placed_residuals();
   for (const PlacedResidual& residual : path.residuals)
     path.chi2_per_dof += residual.residual_px.squaredNorm() / (residual.sigma_px * residual.sigma_px);

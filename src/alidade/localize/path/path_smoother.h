@@ -25,6 +25,7 @@ struct SmootherPoint {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  ///< To begin at.
   std::optional<Eigen::Vector3d> given_in_world;             ///< Of a known point, with its σ of each coordinate.
   double sigma_m = 0.001;
+  double error_factor = 1.0;        ///< σ of where it is seen, over the stated one.
   std::size_t first_frame = 0;      ///< Where its distance had the prior
   std::optional<RangePrior> range;  ///< this.
 };
@@ -34,7 +35,8 @@ struct PlacedResidual {
   std::size_t frame = 0;
   long id = 0;
   Eigen::Vector2d px, residual_px;
-  double sigma_px = 0.5;
+  double sigma_px = 0.5;      ///< As stated,
+  double error_factor = 1.0;  ///< and how much larger the errors of this point are found to be.
 };
 
 /// The gauge freedom of a path: where there is some, its covariance is that after the best alignment.
@@ -73,6 +75,8 @@ struct SmootherProblem {
   std::vector<Rigid3> world_from_cam;         ///< To begin at.
   std::vector<UsedObservation> observations;  ///< In order of frames.
   std::vector<SmootherPoint> points;
+  bool weighs_points = true;    ///< By their residuals, as path_weights.cpp has it; else by the factors that they have,
+  double usual_variance = 1.0;  ///< and with this of the points' usual errors, over the stated one.
   std::optional<StartHypothesis>
       start;  ///< What was given of the first pose; else its speeds alone, zero with these σ:
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
@@ -95,6 +99,8 @@ struct SmoothedPath {
   std::vector<long> ids;                         ///< Of the points, growing.
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> point_covs;
+  std::vector<double> error_factors;  ///< Of the points.
+  double usual_variance = 1.0;        ///< The median of theirs, over the stated one.
   Camera camera;
   bool is_lens_freed = false;
   std::vector<int> estimated;  ///< Of the lens's parameters,
@@ -122,8 +128,10 @@ struct SmoothedPath {
 /// does not converge.
 [[nodiscard]] std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem);
 
-/// Squares over σ² of the observations that fit, and the gate for each other one.
-[[nodiscard]] double cost_of(const SmoothedPath& path, double gate);
+/// Squares over σ² of the observations that fit, and the gate for each other one: σ as stated, or as each point's
+/// errors are found.
+enum class CostBy { stated_sigma, found_sigma };
+[[nodiscard]] double cost_of(const SmoothedPath& path, double gate, CostBy by = CostBy::stated_sigma);
 
 /// The same problem from another initial guess, which owes nothing to the filter: every point as deep as the others,
 /// and each pose by resection from the one before. Where no depth is known a filter's first seconds may end in a

@@ -11,7 +11,8 @@
 #include "alidade/localize/path/path_smoother.h"
 #include "alidade/localize/path/pose_chain.h"
 
-// The work behind path_smoother.h: its factors in path_observations.cpp and path_factors.cpp, its steps and what comes
+// The work behind path_smoother.h: its factors in path_observations.cpp and path_factors.cpp, its weights in
+// path_weights.cpp, its steps and what comes
 // of them in path_smoother.cpp.
 
 namespace alidade {
@@ -88,6 +89,9 @@ class PathSmoother {
   void link_observations(double correlation);
   [[nodiscard]] std::vector<PlacedResidual> placed_residuals() const;
   [[nodiscard]] bool heed_colour();
+  /// path_weights.cpp.
+  [[nodiscard]] bool weigh_points();
+  [[nodiscard]] double gate_of(const UsedObservation& observation, std::size_t point) const;
   [[nodiscard]] bool settle_all();
   /// path_lens.cpp.
   [[nodiscard]] bool asks_for_lens(const SmootherSystem& system) const;
@@ -167,6 +171,8 @@ class PathSmoother {
   ResidualStructure structure_;
   std::vector<Link> links_;  ///< Of each observation; none: errors are independent.
   double link_correlation_ = 0.0;
+  std::vector<double> error_factors_;  ///< Of each point.
+  double usual_variance_ = 1.0;
   std::map<long, std::size_t> index_of_;
   std::vector<int> lens_order_;  ///< Those estimated, then the others.
   std::vector<double> sigma_estimated_;

@@ -61,18 +61,21 @@ std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<con
   return smoothed;
 }
 
-/// The problem begins where another's solution is, larger by a scale.
+/// The problem begins where another's solution is, larger by a scale, with its points' weights.
 void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& problem) {
   for (std::size_t k = 0; k < problem.world_from_cam.size(); ++k) {
     problem.world_from_cam[k] = smoothed.world_from_cam[k];
     problem.world_from_cam[k].translation *= scale;
   }
   if (smoothed.is_lens_freed) problem.freed_lens = smoothed.camera.lens;
+  problem.usual_variance = smoothed.usual_variance;
   std::vector<SmootherPoint> points;
   for (SmootherPoint& point : problem.points) {
     const auto at = std::ranges::lower_bound(smoothed.ids, point.id);
     if (at == smoothed.ids.end() || *at != point.id) continue;
-    point.point_in_world = scale * smoothed.points[static_cast<std::size_t>(at - smoothed.ids.begin())];
+    const auto index = static_cast<std::size_t>(at - smoothed.ids.begin());
+    point.point_in_world = scale * smoothed.points[index];
+    point.error_factor = smoothed.error_factors[index];
     points.push_back(point);
   }
   problem.points = std::move(points);
@@ -80,10 +83,11 @@ void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& probl
 
 /// Whether points that were joined are one: the path with them explains the observations but for what the same corner,
 /// chosen anew, is off by, a quarter of a pixel (a hundred in σ² over some forty observations of each). A place taken
-/// for one a metre away bends the path, and costs ten times that.
+/// for one a metre away bends the path, and costs ten times that. Both by the same weights.
 bool fits_as_well(const SmoothedPath& closed, const SmoothedPath& open, std::size_t num_joined, double gate) {
   constexpr double most_a_point = 100.0;
-  return cost_of(closed, gate) - cost_of(open, gate) < most_a_point * static_cast<double>(num_joined);
+  const double rise = cost_of(closed, gate, CostBy::found_sigma) - cost_of(open, gate, CostBy::found_sigma);
+  return rise < most_a_point * static_cast<double>(num_joined);
 }
 
 /// With its loops closed, where that settles and fits as well as without.
@@ -94,6 +98,7 @@ std::optional<SmoothedPath> smooth_with_loops(const Recording& recording, Smooth
   if (!open || recording.number_of.empty()) return open;
   SmootherProblem closed = problem;
   begin_at(*open, 1.0, closed);
+  closed.weighs_points = false;
   const LoopClosure closure = close_loops(recording.number_of, max_points_at_once(frames.size()), closed);
   result.num_loops_rejected = closure.num_rejected;
   if (closure.num_joined == 0) return open;
@@ -106,6 +111,7 @@ std::optional<SmoothedPath> smooth_with_loops(const Recording& recording, Smooth
   again.num_loops = closure.num_loops;
   result = std::move(again);
   problem = std::move(closed);
+  problem.weighs_points = true;
   return smoothed;
 }
 

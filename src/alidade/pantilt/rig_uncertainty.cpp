@@ -116,14 +116,14 @@ RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s) {
   return uncertainty;
 }
 
-std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, const TurnedHead& turned,
-                                               const Camera& camera, const Eigen::Vector3d& point_in_world,
+std::optional<RigParamEffect> rig_param_effect(const TurnedHead& turned, const Camera& camera,
+                                               const Eigen::Vector3d& point_in_world,
                                                const Eigen::Vector3d& velocity_in_world,
                                                const std::optional<ObservationLens>& lens) {
   const Eigen::Vector3d point_in_cam = turned.point_in_cam(point_in_world);
   const auto seen = project_with_jacobians(camera, point_in_cam);
   if (!seen) return std::nullopt;
-  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, num_head_params + 17> J(2, factor.rows());
+  RigParamEffect J(2, num_head_params + seen->J_px_params.cols() + 1);
   J.leftCols<num_head_params>() = seen->J_px_point * turned.J_point_head(point_in_cam);
   J.middleCols(num_head_params, seen->J_px_params.cols()) = seen->J_px_params;
   J.rightCols<1>() = seen->J_px_point * (turned.cam_from_world_rotation * velocity_in_world);
@@ -131,8 +131,17 @@ std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, co
     J.middleCols<4>(num_head_params) *= lens->error_scale.asDiagonal();
     J = Zoomed(camera, lens->k).ratio.asDiagonal() * J;
   }
+  return J;
+}
+
+std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, const TurnedHead& turned,
+                                               const Camera& camera, const Eigen::Vector3d& point_in_world,
+                                               const Eigen::Vector3d& velocity_in_world,
+                                               const std::optional<ObservationLens>& lens) {
+  const auto J = rig_param_effect(turned, camera, point_in_world, velocity_in_world, lens);
+  if (!J) return std::nullopt;
   RigErrorEffect effect(2, factor.cols());
-  effect.noalias() = J.lazyProduct(factor);
+  effect.noalias() = J->lazyProduct(factor);
   return effect;
 }
 

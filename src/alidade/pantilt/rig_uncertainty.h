@@ -43,4 +43,14 @@ struct RigUncertainty {
                                                              const std::optional<ObservationLens>& lens = {});
 
 ALIDADE_PUBLIC_END
+
+/// ∂ pixel / ∂ the rows of a factor: the head's parameters, its lens', the delay of its clock.
+using RigParamEffect = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, num_head_params + 17>;
+
+/// The same as rig_error_effect() by each parameter of the head.
+[[nodiscard]] std::optional<RigParamEffect> rig_param_effect(const TurnedHead& turned, const Camera& camera,
+                                                             const Eigen::Vector3d& point_in_world,
+                                                             const Eigen::Vector3d& velocity_in_world,
+                                                             const std::optional<ObservationLens>& lens = {});
+
 }  // namespace alidade

@@ -23,8 +23,7 @@ void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<Predi
 
 TrackReport followed(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                      const TrackerConfig& config, const Progress& progress, double predict_s = 0.0,
-                     double smooth_s = 0.0, const TrackWatch& watch = {},
-                     std::optional<Tracker::Learned>* learned = nullptr) {
+                     double smooth_s = 0.0, const TrackWatch& watch = {}) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
@@ -48,7 +47,6 @@ TrackReport followed(std::span<const TargetObservation> observations, std::span<
     report.ahead.push_back({step.t_s + predict_s, ahead.has_value(), ahead.value_or(Belief<6>{})});
   }
   if (report.num_starts > 0) report.status = TrackReport::Status::tracked;
-  if (learned != nullptr) *learned = tracker.learned();
   return report;
 }
 
@@ -177,22 +175,6 @@ void inflate(TrackReport& report) {
   for (PredictedStep& step : report.smoothed) step.belief.P *= report.inflation;
 }
 
-/// What of the rig the observations contradict, by a filter that learns its errors: those that its file states, else
-/// supposed. The target may go anywhere meanwhile, so that its motion is not mistaken for a fault of the rig.
-void ask_for_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                    const FollowConfig& config, TrackReport& report) {
-  constexpr double freely = 10.0, min_m_s2 = 10.0;
-  TrackerConfig learning = config.tracker;
-  learning.method = TargetMotion::cv;
-  learning.learn_errors = true;
-  learning.sigma_a_m_s2 = std::max(min_m_s2, freely * learning.sigma_a_m_s2);
-  if (!report.errors_are_counted) learning.errors = supposed_errors(heads);
-  std::optional<Tracker::Learned> learned;
-  const TrackReport free = followed(observations, heads, learning, config.progress, 0.0, 0.0, {}, &learned);
-  if (learned && free.num_restarts <= 1)
-    report.faults = rig_faults(heads, learning.errors, *learned, !report.errors_are_counted);
-}
-
 /// What observations say of noise, motion and rig. Where the rig's errors are considered, by innovations of a filter
 /// that learns them.
 void judge_observations(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
@@ -205,7 +187,7 @@ void judge_observations(std::span<const TargetObservation> observations, std::sp
   const std::vector<TrackStep> steps = followed(sorted, heads, learning, config.progress).steps;
   report.nis_per_dof = mean_nis(steps, counted(steps, config.warm_up_s), config.tracker.gate);
   report.innovations = test_innovations(sorted, heads, steps, config);
-  ask_for_faults(sorted, heads, config, report);
+  report.faults = rig_faults(sorted, heads, config.tracker);
 }
 
 }  // namespace
@@ -232,6 +214,7 @@ TrackReport track_target(std::span<const TargetObservation> observations, std::s
   if (config.judge) {
     judge_observations(observations, heads, used, report);
     inflate(report);
+    heed_faults(observations, heads, used, report);
   } else {
     report.nis_per_dof = mean_nis(report.steps, counts, config.tracker.gate);
   }

@@ -37,11 +37,13 @@ struct HeadInnovations {
   double nis_per_dof = 0.0;
 };
 
-/// A parameter of the rig file that the observations contradict.
+/// A parameter of the rig file that the observations may contradict.
 struct RigFault {
-  std::string name;  ///< "head2.base_rx_rad", "head1.tilt_scale", "head2.camera.fy".
-  double off = 0.0;  ///< By how much it seems off, in its unit.
-  double z = 0.0;    ///< The same over what would be by chance.
+  std::string name;       ///< "head2.pan_zero_rad", "head1.base_rx_rad", "head2.camera.f", "head2.clock_s".
+  double off = 0.0;       ///< By how much it is off if it alone is, in its unit: the true value − the file's.
+  double z = 0.0;         ///< Of a right rig normal with mean 0 and σ 1, the sign left out.
+  std::size_t head = 0;   ///< Index in the rig's list of heads.
+  Eigen::VectorXd moved;  ///< The same of the head's rows in RigUncertainty.
 };
 
 /// What became of all observations, and how good it is. Positions and velocities are in the rig's world.
@@ -68,7 +70,8 @@ struct TrackReport {
   /// coloured by what does not change. One per head.
   std::vector<HeadInnovations> innovations;
   double inflation = 1.0;           ///< Every covariance was increased by this factor, from the innovations.
-  std::vector<RigFault> faults;     ///< The most surprising first.
+  std::vector<RigFault> faults;     ///< The most significant first.
+  bool fits_without_fault = false;  ///< The first is significant, and with it corrected the observations fit.
   bool errors_are_counted = false;  ///< Those of the rig.
 };
 

@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "alidade/track/checks/rig_faults.h"
+
 namespace alidade {
 namespace {
 
@@ -96,6 +98,21 @@ bool is_throughout(const BlockCosts& given, const BlockCosts& shifted) {
   return sum - most > min_elsewhere;
 }
 
+/// Of the rivals the one that makes the observations most probable, if that is as probable as the shift makes them.
+void note_rival(const std::vector<std::vector<TargetObservation>>& stretches, std::span<const RigHead> heads,
+                const FollowConfig& config, std::span<const RigFault> rivals, double cost_as_given, ClockShift& shift) {
+  constexpr double clear = 3.0;
+  double most = shift.gain - clear;
+  for (const RigFault& rival : rivals) {
+    const double gain = cost_as_given - costs_of(stretches, without_fault({}, heads, rival).heads, config, {}).sum();
+    if (!(gain > most)) continue;
+    most = gain;
+    shift.rival = rival.name;
+    shift.rival_off = rival.off;
+    shift.rival_gain = gain;
+  }
+}
+
 }  // namespace
 
 std::vector<TargetObservation> with_shift(std::span<const TargetObservation> observations, const ClockShift& shift) {
@@ -109,7 +126,8 @@ std::vector<TargetObservation> with_shift(std::span<const TargetObservation> obs
 }
 
 std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation> observations,
-                                               std::span<const RigHead> heads, const FollowConfig& config) {
+                                               std::span<const RigHead> heads, const FollowConfig& config,
+                                               std::span<const RigFault> rivals) {
   const std::size_t max_observations =
       config.tracker.errors.num() > 0 ? 1200 : 4000;  // learning costs several times more
   constexpr double min_gain = 20.0, nis_that_fits = 1.5;
@@ -135,6 +153,7 @@ std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation
   for (const double near_ms : {-12.0, -8.0, -4.0, 4.0, 8.0, 12.0})
     try_shift({coarse.head, coarse.later_s + 1e-3 * near_ms});
   if (!(of_best.nis_per_dof < nis_that_fits) || !is_throughout(as_given, of_best)) return std::nullopt;
+  note_rival(stretches, heads, config, rivals, as_given.sum(), *best);
   return best;
 }
 

@@ -128,9 +128,13 @@ std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) 
   const std::string others = heads.size() > 2  ? "those of the others"
                              : shift.head == 1 ? "that of head " + std::to_string(heads[0].head.id)
                                                : "that of head " + std::to_string(heads[1].head.id);
+  const std::string rival = "that " + shift.rival + " is off by " + text_of(std::abs(shift.rival_off), 2);
+  if (shift.is_worse_than_rival())
+    return rival + " makes the observations far more probable, more than another time of a clock does";
   return "the clock of " + head_name(heads, shift.head) + " seems " + text_of(1e3 * std::abs(shift.later_s), 2) +
          " ms " + (shift.later_s > 0.0 ? "behind" : "ahead of") + " " + others +
-         ": with its times moved by that the observations are far more probable";
+         ": with its times moved by that the observations are far more probable" +
+         (shift.rival.empty() ? "" : "; " + rival + " explains them as well");
 }
 
 std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,

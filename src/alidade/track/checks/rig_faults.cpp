@@ -4,81 +4,291 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
+#include "alidade/track/checks/path_equations.h"
 
 namespace alidade {
 namespace {
 
-/// An error that moves a ray within the plane of both rays changes only the range: it is unobservable, and a filter's
-/// apparent information about it comes from its own linearisation. Observable are the parameters across that plane:
-/// for heads side by side rotations about x or z, vertical offsets, and of a lens fy and cy.
-bool is_across(std::span<const RigHead> heads, Eigen::Index param) {
-  const Eigen::Vector3d apart =
-      heads.back().head.world_from_base.translation - heads.front().head.world_from_base.translation;
-  const bool side_by_side = std::abs(apart.x()) >= std::abs(apart.y());
-  constexpr std::array<Eigen::Index, 8> vertical{1, 3, 5, 12, 16, 18, num_head_params + 1, num_head_params + 3};
-  constexpr std::array<Eigen::Index, 8> horizontal{0, 4, 5, 13, 15, 17, num_head_params + 0, num_head_params + 2};
-  return std::ranges::count(side_by_side ? vertical : horizontal, param) > 0;
+/// A parameter of a head that is tested.
+struct Tested {
+  std::string name;
+  Eigen::VectorXd step;  ///< Of the head's rows, in the parameter's unit.
+  double large = 1.0;    ///< Errors are smaller.
+};
+
+std::vector<Tested> tested_of(const RigHead& head) {
+  constexpr double large_rad = 0.2, large_m = 0.3, large_scale = 0.1, large_px = 100.0, large_s = 0.1;
+  const Eigen::VectorXd lens = params(head.camera.lens);
+  const Eigen::Index clock = num_head_params + lens.size();
+  const std::string prefix = "head" + std::to_string(head.head.id) + ".";
+  std::vector<Tested> all;
+  const auto add = [&](const std::string& name, Eigen::Index row, double large) {
+    all.push_back({prefix + name, Eigen::VectorXd::Unit(clock + 1, row), large});
+  };
+  const auto add_own = [&](int row, double large) { add(head_param_names[static_cast<std::size_t>(row)], row, large); };
+  for (const int axis : {0, 1}) add_own(pan_zero_param + axis, large_rad);
+  for (const int axis : {0, 1}) add_own(pan_scale_param + axis, large_scale);
+  for (const int axis : {0, 1, 2}) add_own(base_rotation_param + axis, large_rad);
+  for (const int axis : {0, 1, 2}) add_own(base_param + axis, large_m);
+  add("camera.f", num_head_params, large_scale * lens[0]);
+  all.back().step[num_head_params + 1] = lens[1] / lens[0];
+  add("camera.cx", num_head_params + 2, large_px);
+  add("camera.cy", num_head_params + 3, large_px);
+  add("clock_s", clock, large_s);
+  return all;
 }
+
+/// How far each of a head's rays lies off the line from the one before to the one after. [rad]
+std::vector<double> off_line(std::span<const TargetObservation> observations, std::span<const std::size_t> own,
+                             std::span<const Eigen::Vector3d> directions) {
+  constexpr double max_apart_s = 0.3;
+  std::vector<double> off(own.size(), 0.0);
+  for (std::size_t k = 1; k + 1 < own.size(); ++k) {
+    const double before_s = observations[own[k - 1]].t_capture_s, after_s = observations[own[k + 1]].t_capture_s;
+    if (!(after_s > before_s) || after_s - before_s > max_apart_s) continue;
+    const double share = (observations[own[k]].t_capture_s - before_s) / (after_s - before_s);
+    off[k] = (directions[k] - (1.0 - share) * directions[k - 1] - share * directions[k + 1]).norm();
+  }
+  return off;
+}
+
+/// Without what is false: judged by each head's own observations, so that a fault of the rig rejects nothing. Of a long
+/// log eight stretches.
+std::vector<TargetObservation> in_line(std::span<const TargetObservation> observations,
+                                       std::span<const RigHead> heads) {
+  constexpr double max_sigma = 6.0;
+  constexpr std::size_t max_observations = 4000, num_stretches = 8;
+  std::vector<std::size_t> kept;
+  for (std::size_t h = 0; h < heads.size(); ++h) {
+    std::vector<std::size_t> own;
+    std::vector<Eigen::Vector3d> directions;
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      if (observations[i].head != h) continue;
+      const auto ray = ray_in_world(heads[h], observations[i]);
+      if (!ray) continue;
+      own.push_back(i);
+      directions.push_back(ray->direction_in_world);
+    }
+    const std::vector<double> off = off_line(observations, own, directions);
+    const double limit = max_sigma * median_of(off) / rayleigh_median;
+    for (std::size_t k = 0; k < own.size(); ++k)
+      if (off[k] <= limit) kept.push_back(own[k]);
+  }
+  std::ranges::sort(kept);
+  const std::size_t length = max_observations / num_stretches;
+  std::vector<TargetObservation> result;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const std::size_t stretch = i * num_stretches / kept.size(), begins = stretch * kept.size() / num_stretches;
+    if (kept.size() <= max_observations || i < begins + length) result.push_back(observations[kept[i]]);
+  }
+  return result;
+}
+
+/// By how much the noise's variance is larger than stated: of what neither path nor tested parameters explain. These
+/// are only as large as errors are: a huge scale would explain the readings' noise itself.
+double noise_factor(const PathEquations& given, const Eigen::MatrixXd& large) {
+  const Eigen::MatrixXd weight = large.transpose() * given.information * large;
+  const Eigen::VectorXd pull = large.transpose() * given.g;
+  const Eigen::MatrixXd inverse = inverse_symmetric(weight + Eigen::MatrixXd::Identity(weight.rows(), weight.cols()));
+  const double cost = given.cost - pull.dot(inverse * pull);
+  const double expected = given.expected_cost - (inverse * weight).trace();
+  return expected > 0.0 ? std::max(1.0, cost / expected) : 1.0;
+}
+
+/// Leaves in the equations what the errors that the rig file allows do not explain.
+void eliminate_errors(const RigUncertainty& errors, PathEquations& given) {
+  if (errors.num() == 0) return;
+  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(given.g.size(), errors.num());
+  Eigen::Index first = 0;
+  for (const Eigen::MatrixXd& of_head : errors.factor) {
+    factor.middleRows(first, of_head.rows()) = of_head;
+    first += of_head.rows();
+  }
+  const Eigen::MatrixXd across = given.information * factor;
+  const Eigen::MatrixXd inverse =
+      inverse_symmetric(factor.transpose() * across + Eigen::MatrixXd::Identity(errors.num(), errors.num()));
+  given.g -= across * (inverse * (factor.transpose() * given.g));
+  given.information -= across * inverse * across.transpose();
+}
+
+bool is_of_clock(const RigFault& fault) { return fault.name.ends_with("clock_s"); }
+
+double ln_gain(const RigFault& fault) { return 0.5 * fault.z * fault.z; }
+
+/// Whether a fault explains the observations as well as the first: of so much ln p a choice may err once in 20.
+bool is_alike(const RigFault& first, const RigFault& fault) {
+  constexpr double clear = 3.0;
+  return ln_gain(first) - ln_gain(fault) < clear;
+}
+
+/// Of parameters that do the same the one that is tested first is named first.
+void put_first(std::vector<RigFault>& faults, std::span<const std::string> order) {
+  constexpr double same = 0.1;
+  std::ranges::stable_sort(faults, std::ranges::greater{}, &RigFault::z);
+  if (faults.empty()) return;
+  const auto rank = [&](const RigFault& fault) { return std::ranges::find(order, fault.name) - order.begin(); };
+  auto best = faults.begin();
+  for (auto fault = faults.begin(); fault != faults.end() && faults.front().z - fault->z < same; ++fault)
+    if (fault->head == faults.front().head && rank(*fault) < rank(*best)) best = fault;
+  std::rotate(faults.begin(), best, best + 1);
+}
+
+/// All that is tested, and of each a column of all parameters: as large as errors are.
+struct AllTested {
+  std::vector<RigFault> faults;  ///< `moved` per unit, off as large as errors are.
+  std::vector<std::string> names;
+  Eigen::MatrixXd large;
+
+  AllTested(std::span<const RigHead> heads, Eigen::Index num_params) : large(num_params, 0) {
+    Eigen::Index first = 0;
+    for (std::size_t h = 0; h < heads.size(); ++h) {
+      const std::vector<Tested> tested = tested_of(heads[h]);
+      for (const Tested& each : tested) {
+        large.conservativeResize(Eigen::NoChange, large.cols() + 1);
+        large.rightCols<1>().setZero();
+        large.rightCols<1>().middleRows(first, each.step.size()) = each.large * each.step;
+        faults.push_back({.name = each.name, .off = each.large, .head = h, .moved = each.step});
+        names.push_back(each.name);
+      }
+      first += tested.front().step.size();
+    }
+  }
+};
 
 }  // namespace
 
-std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
-                                 const Tracker::Learned& learned, bool is_supposed) {
-  // Of the variance: what the observations determine to a tenth of the file's precision, the file may contradict by
-  // fifty of its σ.
-  constexpr double min_given = 0.01;
-  std::vector<RigFault> faults;
-  // What the observations add to u ~ N(0, 1): the information, and its vector.
-  const Eigen::MatrixXd inverse = inverse_symmetric(learned.cov);
-  const Eigen::MatrixXd given = inverse - Eigen::MatrixXd::Identity(inverse.rows(), inverse.cols());
-  const Eigen::VectorXd given_u = inverse * learned.u;
-  for (std::size_t h = 0; h < heads.size() && h < errors.factor.size(); ++h) {
-    const Eigen::MatrixXd& factor = errors.factor[h];
-    const std::vector<std::string> lens = param_names(heads[h].camera.lens);
-    for (Eigen::Index p = 0; p < factor.rows(); ++p) {
-      if (!is_across(heads, p)) continue;
-      const Eigen::RowVectorXd row = factor.row(p);
-      const double before = row.squaredNorm(), after = row * learned.cov * row.transpose();
-      if (!(before > 0.0) || !(before - after > min_given * before)) continue;
-      const Eigen::Index k = p - num_head_params;
-      const std::string name = k < 0 ? std::string(head_param_names[static_cast<std::size_t>(p)])
-                                     : "camera." + lens[static_cast<std::size_t>(k)];
-      double off = row * learned.u, z = std::abs(off) / std::sqrt(before - after);
-      if (is_supposed) {  // if it alone errs: one cause is tested, not all of them at once
-        const Eigen::VectorXd alone = row.transpose() / std::sqrt(before);
-        const double pull = alone.dot(given_u), weight = alone.dot(given * alone);
-        if (!(weight > 0.0)) continue;
-        off = std::sqrt(before) * pull / weight;
-        z = std::abs(pull) / std::sqrt(weight);
-      }
-      faults.push_back({"head" + std::to_string(heads[h].head.id) + "." + name, off, z});
-    }
+std::vector<RigFault> rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                 const TrackerConfig& config) {
+  constexpr std::size_t min_observations = 16;
+  // A wrong rig makes a target seem more manoeuvring than any is.
+  constexpr double max_m_s2 = 3.0, freely = 10.0, min_free_m_s2 = 10.0, unobservable = 1e-7;
+  const std::vector<TargetObservation> used = in_line(observations, heads);
+  if (used.size() < min_observations) return {};
+  TrackerConfig calm = config;
+  calm.sigma_a_m_s2 = std::min(max_m_s2, config.sigma_a_m_s2);
+  const auto path = smooth_path(used, heads, calm);
+  if (!path) return {};
+  PathEquations given = path_equations(used, heads, *path, calm, std::max(min_free_m_s2, freely * calm.sigma_a_m_s2));
+  if (!given.information.allFinite() || !given.g.allFinite()) return {};
+  AllTested tested(heads, given.g.size());
+  const double noise = noise_factor(given, tested.large);
+  given.information /= noise;
+  given.g /= noise;
+  eliminate_errors(config.errors, given);
+  for (std::size_t k = 0; k < tested.faults.size(); ++k) {
+    RigFault& fault = tested.faults[k];
+    const Eigen::VectorXd direction = tested.large.col(static_cast<Eigen::Index>(k));
+    const double weight = direction.dot(given.information * direction), pull = direction.dot(given.g);
+    const double share = pull / weight;  // of what is large
+    const bool is_seen = weight > unobservable * direction.cwiseAbs2().dot(given.seen) / noise;
+    if (is_seen && std::abs(share) < 1.0) fault.z = std::abs(pull) / std::sqrt(weight);
+    fault.off *= share;
+    fault.moved *= fault.off;
   }
-  std::ranges::stable_sort(faults, std::ranges::greater{}, &RigFault::z);
-  return faults;
+  std::erase_if(tested.faults, [](const RigFault& fault) { return !(fault.z > 0.0); });
+  put_first(tested.faults, tested.names);
+  return tested.faults;
 }
 
-RigUncertainty supposed_errors(std::span<const RigHead> heads) {
-  constexpr double turn_rad = 0.01, scale = 0.01, share_of_f = 0.01;
-  Rig rig;
-  rig.heads.assign(heads.begin(), heads.end());
-  const auto num = num_head_params * static_cast<Eigen::Index>(heads.size());
-  rig.cov.setZero(num, num);
-  for (std::size_t h = 0; h < heads.size(); ++h) {
-    const Eigen::Index first = num_head_params * static_cast<Eigen::Index>(h);
-    const auto suppose = [&](Eigen::Index param, double sigma) {
-      if (is_across(heads, param)) rig.cov(first + param, first + param) = sigma * sigma;
-    };
-    for (const Eigen::Index turn : {3, 4, 5}) suppose(turn, h > 0 ? turn_rad : 0.0);
-    for (const Eigen::Index axis : {17, 18}) suppose(axis, scale);
-    Camera& camera = rig.heads[h].camera;
-    const Eigen::VectorXd values = params(camera.lens);
-    camera.cov.setZero(values.size(), values.size());
-    for (const Eigen::Index f : {0, 1})
-      if (is_across(heads, num_head_params + f)) camera.cov(f, f) = std::pow(share_of_f * values[f], 2);
+std::vector<RigFault> alike_per_head(const TrackReport& report) {
+  std::vector<RigFault> alike;
+  if (report.faults.empty() || !(report.faults.front().z > max_fault_z(report))) return alike;
+  for (const RigFault& fault : report.faults)
+    if (is_alike(report.faults.front(), fault) && std::ranges::count(alike, fault.head, &RigFault::head) == 0)
+      alike.push_back(fault);
+  return alike;
+}
+
+std::vector<RigFault> rivals_of_clocks(const TrackReport& report) {
+  constexpr double min_z = 3.0;
+  std::vector<RigFault> rivals;
+  for (const RigFault& fault : report.faults)
+    if (fault.z > min_z && !is_of_clock(fault) && std::ranges::count(rivals, fault.head, &RigFault::head) == 0)
+      rivals.push_back(fault);
+  return rivals;
+}
+
+bool is_explained_by_fault(const TrackReport& report) {
+  return report.fits_without_fault && !is_of_clock(report.faults.front());
+}
+
+WithoutFault without_fault(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                           const RigFault& fault) {
+  WithoutFault result{{heads.begin(), heads.end()}, {observations.begin(), observations.end()}};
+  RigHead& head = result.heads[fault.head];
+  const Eigen::Index num_lens = fault.moved.size() - num_head_params - 1;
+  head.head = retract(head.head, fault.moved.head<num_head_params>());
+  head.camera.lens =
+      with_params(head.camera.lens, params(head.camera.lens) + fault.moved.segment(num_head_params, num_lens));
+  for (TargetObservation& observation : result.observations)
+    if (observation.head == fault.head) observation.t_capture_s += fault.moved[num_head_params + num_lens];
+  return result;
+}
+
+void heed_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                 const FollowConfig& config, TrackReport& report) {
+  constexpr double min_used = 0.95, max_nis = 1.5;
+  FollowConfig plain = config;
+  plain.judge = plain.find_sigma_a = false;
+  std::vector<TrackReport> others;
+  for (const RigFault& fault : alike_per_head(report)) {
+    const WithoutFault right = without_fault(observations, heads, fault);
+    others.push_back(track_target(right.observations, right.heads, plain));
+    const TrackReport& other = others.back();
+    if (others.size() == 1)
+      report.fits_without_fault =
+          static_cast<double>(other.num_used) > min_used * static_cast<double>(other.steps.size()) &&
+          other.nis_per_dof < max_nis && other.num_restarts == 0;
   }
-  return rig_uncertainty(rig);
+  const auto widen = [&others](auto of, Belief<6>& belief, std::size_t i) {
+    Eigen::Vector<double, 6> moved = Eigen::Vector<double, 6>::Zero();
+    for (const TrackReport& other : others) {
+      if (i >= of(other).size() || !of(other)[i].has_belief) continue;
+      const Eigen::Vector<double, 6> by = of(other)[i].belief.x - belief.x;
+      if (by.head<3>().norm() > moved.head<3>().norm()) moved = by;
+    }
+    belief.P += moved * moved.transpose();
+  };
+  for (std::size_t i = 0; i < report.steps.size(); ++i)
+    if (report.steps[i].has_belief)
+      widen(
+          [](const TrackReport& of) -> const auto& { return of.steps; }, report.steps[i].belief, i);
+  for (std::size_t i = 0; i < report.ahead.size(); ++i)
+    if (report.ahead[i].has_belief)
+      widen(
+          [](const TrackReport& of) -> const auto& { return of.ahead; }, report.ahead[i].belief, i);
+  for (std::size_t i = 0; i < report.smoothed.size(); ++i)
+    if (report.smoothed[i].has_belief)
+      widen(
+          [](const TrackReport& of) -> const auto& { return of.smoothed; }, report.smoothed[i].belief, i);
+}
+
+std::string fault_text(const TrackReport& report) {
+  constexpr std::size_t max_named = 4;
+  const RigFault& first = report.faults.front();
+  std::string text = "the observations say that " + first.name + " is off by " + text_of(std::abs(first.off), 2) +
+                     " (" + text_of(first.z, 2) + "σ of " +
+                     (report.errors_are_counted ? "what the rig file allows)" : "chance)");
+  std::size_t num = 0;
+  for (std::size_t k = 1; k < report.faults.size(); ++k) {
+    if (!is_alike(first, report.faults[k]) || ++num > max_named) continue;
+    text += (num == 1 ? ", which cannot be told apart from " : ", ") + report.faults[k].name;
+  }
+  if (num > max_named) text += " and " + std::to_string(num - max_named) + " more";
+  return text;
+}
+
+std::string fault_remedy(const TrackReport& report, std::span<const RigHead> heads) {
+  std::string names;
+  bool may_be_clock = false;
+  for (const RigFault& fault : alike_per_head(report)) {
+    names += (names.empty() ? "" : " or ") + std::to_string(heads[fault.head].head.id);
+    may_be_clock |= is_of_clock(fault);
+  }
+  return "calibrate head " + names + " again as it stands now (alidade rig)" +
+         (may_be_clock ? ", and check its clock" : "");
 }
 
 }  // namespace alidade

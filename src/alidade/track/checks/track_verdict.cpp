@@ -9,6 +9,7 @@
 
 #include "alidade/track/checks/clock_shift.h"
 #include "alidade/track/checks/explanation.h"
+#include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/track.h"
 
 namespace alidade {
@@ -160,17 +161,11 @@ void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdic
       check("lean", lean.size > 0.0 ? State::care : State::good,
             lean.size > 0.0 ? lean.text : "by head, motion and position the innovations have no lean", lean.size,
             min_mean, "σ");
-  constexpr double max_z = 5.0;
   if (!report.faults.empty()) {
-    const RigFault& worst = report.faults.front();
-    const bool is_off = worst.z > max_z;
-    const std::string kind = report.errors_are_counted ? " of what the rig file allows)" : " of chance)";
-    verdict.checks.push_back(check("rig", is_off ? State::care : State::good,
-                                   is_off
-                                       ? "the observations say that " + worst.name + " is off by " +
-                                             text_of(std::abs(worst.off), 2) + " (" + text_of(worst.z, 2) + "σ" + kind
-                                       : "the heads' rays meet as the rig file lets them",
-                                   worst.z, max_z, "σ"));
+    const double z = report.faults.front().z, max_z = max_fault_z(report);
+    verdict.checks.push_back(check("rig", z > max_z ? State::care : State::good,
+                                   z > max_z ? fault_text(report) : "the heads' rays meet as the rig file lets them", z,
+                                   max_z, "σ"));
   }
   verdict.checks.push_back(lean_check);
   if (report.inflation > 1.0)
@@ -291,13 +286,17 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   FollowConfig found = config;
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
-  if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected)
-    causes.mistake = explanation_of(observations, heads, config);
+  const bool is_explained = is_explained_by_fault(report);
+  if (is_explained && !fits(report)) return causes;
+  const bool is_odd = !fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected;
+  if (is_odd && !is_explained) causes.mistake = explanation_of(observations, heads, config);
   if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
-  causes.shift = probable_clock_shift(observations, heads, found);
+  causes.shift = probable_clock_shift(observations, heads, found, rivals_of_clocks(report));
   // A head with a wrong clock agrees with none of the others, either.
   if (causes.mistake && !causes.shift) return causes;
   causes.mistake.reset();
+  if (causes.shift && causes.shift->is_worse_than_rival() && !alike_per_head(report).empty()) causes.shift.reset();
+  if (is_explained) return causes;
   causes.second = second_target(report, observations, heads, found);
   if (report.num_restarts > 0 || report.nis_per_dof > good_nis_high)
     causes.falls = falling_target(observations, heads, config);
@@ -316,6 +315,10 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
     return Fault{text_of(100.0 * late, 2) + " % of the observations come more than " +
                      text_of(config.tracker.history_s, 2) + " s after others that were taken later",
                  "give them in order of capture, or check t_capture_s of each head: their clocks may differ by that"};
+  if (is_explained_by_fault(report) && !fits(report))
+    return Fault{"only " + text_of(100.0 * used_share(report), 2) +
+                     " % of the observations fit one track and this rig: " + fault_text(report),
+                 fault_remedy(report, heads)};
   if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_rejected)) return causes.mistake;
   if (fits(report)) return std::nullopt;
   if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
@@ -373,6 +376,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   add_white(report, heads, verdict);
   put_likelier_first(verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
+  if (!alike_per_head(report).empty()) verdict.to_add = fault_remedy(report, heads);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   verdict.sentence = sentence_of(report, verdict);
   return verdict;

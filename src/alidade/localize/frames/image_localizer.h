@@ -68,6 +68,7 @@ class ImageLocalizer {
   void let_go(long id);
   [[nodiscard]] double period_s() const { return config_.period_s > 0.0 ? config_.period_s : period_s_; }
   [[nodiscard]] Recording recording() const;
+  void leave_out_joined(const WholePath& whole, Localization& result) const;
   [[nodiscard]] double usual_depth_m() const;
   [[nodiscard]] bool find_back(const cv::Mat& smoothed, PathStep& step);
   [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);

@@ -32,6 +32,17 @@ Recording ImageLocalizer::recording() const {
   return recording;
 }
 
+/// Landmarks that a closed loop has made one are in the map once.
+void ImageLocalizer::leave_out_joined(const WholePath& whole, Localization& result) const {
+  if (result.num_loops == 0) return;
+  const std::vector<long>& solved = whole.smoothed.ids;
+  std::erase_if(result.map, [&](const MapPoint& point) {
+    const auto before = number_of_.find(point.id);
+    return before != number_of_.end() && !std::ranges::binary_search(solved, point.id) &&
+           std::ranges::binary_search(solved, before->second);
+  });
+}
+
 void ImageLocalizer::sum_up(Localization& result) const {
   result.is_of_images = true;
   result.lacks_circle = lacks_circle_;
@@ -45,6 +56,7 @@ void ImageLocalizer::sum_up(Localization& result) const {
   if (config_.smooths) whole = whole_path(kept, engine_, config, result);
   engine_.sum_up(kept.num_used, result);
   take_over(whole, kept, engine_, config, result);
+  if (whole) leave_out_joined(*whole, result);
   result.known_shift = known_shift(result.map, given_);
 }
 

@@ -156,6 +156,7 @@ struct Localization {
   bool is_smoothed = false;         ///< Path and map are from all observations together, not each from those before it.
   std::size_t smoothed_every = 1;   ///< Of so many frames one was solved for, those between follow: a long recording.
   std::size_t num_unexplained = 0;  ///< Frames of a smoothed path of which most observations do not fit it.
+  std::size_t num_untied = 0;       ///< Reinitialisations on both sides of which few points are the same there.
   /// Of a smoothed path: along its least certain direction the cost rises more slowly to one side than to the other, or
   /// than σ says; σ is enlarged there by so much.
   double widened = 1.0;

@@ -63,24 +63,31 @@ void add_truth(const Localization& report, Verdict& verdict) {
                               before, elsewhere_ratio, "σ", "path"});
 }
 
-/// Whether the smoothed path explains what was seen before the filter was reinitialised, too. Matches of images were
-/// looked for where the filter expected them: that they fit does not show that it was right.
-bool is_solved_again(const Localization& report) {
-  constexpr double few = 0.01;
-  return report.is_smoothed && !report.is_of_images && share(report.num_unexplained, report.path.size()) < few;
-}
-
-/// Again and again without being lost: no path explains what this camera saw of this target.
-State restarts_state(const Localization& report) {
-  if (is_solved_again(report)) return State::good;
-  // Mismatches in a table may look like another pose for a frame.
-  if (!report.is_of_images && (report.is_smoothed || !(report.nis_per_dof > good_nis_high))) return State::care;
+/// Reinitialised again and again without being lost.
+bool begins_often(const Localization& report) {
   std::size_t num_again = 0;
   for (std::size_t i = 1; i < report.path.size(); ++i)
     num_again += report.path[i].event == FrameEvent::restarted && report.path[i - 1].event != FrameEvent::predicted;
   constexpr std::size_t few = 3;
   constexpr double often = 0.01;
-  return num_again >= few && share(num_again, report.path.size()) >= often ? State::bad : State::care;
+  return num_again >= few && share(num_again, report.path.size()) >= often;
+}
+
+/// Whether the smoothed path explains what was seen before the filter was reinitialised, too. Matches of images were
+/// looked for where the filter expected them: that they fit shows that it was right where the points that are seen on
+/// both sides are the same.
+bool is_solved_again(const Localization& report) {
+  constexpr double few = 0.01;
+  if (!report.is_smoothed || !(share(report.num_unexplained, report.path.size()) < few)) return false;
+  return !report.is_of_images || (report.num_untied == 0 && !begins_often(report));
+}
+
+/// Often: no path explains what this camera saw of this target.
+State restarts_state(const Localization& report) {
+  if (is_solved_again(report)) return State::good;
+  // Mismatches in a table may look like another pose for a frame.
+  if (!report.is_of_images && (report.is_smoothed || !(report.nis_per_dof > good_nis_high))) return State::care;
+  return begins_often(report) ? State::bad : State::care;
 }
 
 /// After frames without a pose it is the way back; else what led to it was wrong for some time before.

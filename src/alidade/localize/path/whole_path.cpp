@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
@@ -27,6 +28,23 @@ void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::sp
     for (const FeatureObservation& observation : frames[k].observations)
       num_of_map += std::ranges::binary_search(smoothed.ids, observation.id) ? 1 : 0;
     result.num_unexplained += 2 * num_fit[k] < num_of_map ? 1 : 0;
+  }
+}
+
+/// How often the filter was reinitialised where hardly a point fits the smoothed path on both sides: what is before it
+/// may then be anywhere.
+void count_untied(const SmoothedPath& smoothed, std::size_t first_frame, Localization& result) {
+  constexpr std::size_t near = 15, enough = 8;
+  result.num_untied = 0;
+  for (std::size_t k = first_frame; k < result.path.size(); ++k) {
+    if (result.path[k].event != FrameEvent::restarted) continue;
+    std::set<long> before, both;
+    for (const PlacedResidual& residual : smoothed.residuals) {
+      const std::size_t at = first_frame + residual.frame;
+      if (at + near >= k && at < k) before.insert(residual.id);
+      if (at >= k && at <= k + near && before.contains(residual.id)) both.insert(residual.id);
+    }
+    result.num_untied += both.size() < enough ? 1 : 0;
   }
 }
 
@@ -58,6 +76,7 @@ std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<con
     step.cov = smoothed->cov[k];
   }
   judge_frames(*smoothed, problem.first_frame, frames, result);
+  count_untied(*smoothed, problem.first_frame, result);
   return smoothed;
 }
 

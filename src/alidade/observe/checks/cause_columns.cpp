@@ -14,7 +14,7 @@ constexpr int max_lever_points = 16, max_across_points = 8;
 constexpr int num_waves = 6;  // half waves over the log: slower ones than that leave no rest to learn the points in
 constexpr double usual_wave = 0.005;
 constexpr double usual_k = 0.3, usual_p = 0.01, usual_mount_rad = 0.2, usual_delay_s = 0.1, usual_shutter_s = 0.03,
-                 usual_zoom_per_s = 0.01, usual_parallax_rad = 0.05;
+                 usual_zoom_per_s = 0.01, usual_parallax_rad = 0.05, usual_step_rad = 0.02;
 
 ObserveNuisances without_rotation(ObserveNuisances nuisances) {
   nuisances.rotation = false;
@@ -71,7 +71,8 @@ CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, 
       height_(config.height),
       patterns_(turn_patterns(log, errors_but(log, reference, config.errors), config.max_gap_s)),
       lever_column_(reference.bundle.points.size(), -1),
-      across_column_(reference.bundle.points.size(), -1) {
+      across_column_(reference.bundle.points.size(), -1),
+      steps_s_(config.steps_s) {
   for (const RotationFrame& frame : reference.bundle.frames) {
     const auto row = std::lower_bound(log.rows.begin(), log.rows.end(), frame.t_s - 1e-9,
                                       [](const RotationRow& r, double t_s) { return r.t_s < t_s; });
@@ -96,6 +97,7 @@ CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, 
   if (drift_ >= 0) add("focal length that drifts", "f'/f", usual_zoom_per_s, "1/s");
   add_zoom();
   if (!config.nuisances.lever) add_lever();
+  if (is_measured && !has_rotations(reference.solution)) add_steps();
   first_pattern_ = size();
   for (const TurnPattern& pattern : patterns_) {
     add(pattern.error.cause, pattern.error.member, pattern.error.ordinary, pattern.error.unit);
@@ -135,6 +137,15 @@ void CauseColumns::add_zoom() {
   for (int wave = 1; wave <= num_waves; ++wave) {
     add("focal length that varies", "in " + std::to_string(wave) + (wave == 1 ? " half wave" : " half waves"),
         usual_wave);
+  }
+}
+
+/// Each instant is a cause of its own.
+void CauseColumns::add_steps() {
+  first_step_ = size();
+  for (const double from_s : steps_s_) {
+    groups_.push_back({step_cause, {size(), size() + 1, size() + 2}, from_s});
+    for (const char* member : {"about x", "about y", "about z"}) columns_.push_back({member, "rad", usual_step_rad});
   }
 }
 
@@ -201,6 +212,8 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
   if (first_mount_ >= 0) by_causes.middleCols<3>(first_mount_) = wide.J_px_common.middleCols<3>(wide_.mount);
   if (first_delay_ >= 0) by_causes.col(first_delay_) = wide.J_px_common.col(wide_.delay);
   if (shutter_ >= 0) by_causes.col(shutter_) = wide.J_px_common.col(wide_.delay) * (seen.px.y() / height_);
+  for (std::size_t i = 0; first_step_ >= 0 && i < steps_s_.size(); ++i)
+    if (frame_time_s_ >= steps_s_[i]) by_causes.middleCols<3>(first_step_ + 3 * static_cast<int>(i)) = by_rotation;
   const auto& frames = reference_.bundle.frames;
   const double mid_s = 0.5 * (frames.front().t_s + frames.back().t_s);
   if (drift_ >= 0)

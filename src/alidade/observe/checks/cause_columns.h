@@ -10,6 +10,7 @@ class CauseColumns {
   struct Group {
     std::string name;
     std::vector<int> columns;
+    double from_s = not_seen;  ///< Of a step.
   };
   struct Column {
     std::string member, unit;
@@ -36,6 +37,7 @@ class CauseColumns {
   void add_lens();
   void add_lever();
   void add_zoom();
+  void add_steps();
   void fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const;
 
   const Adjustment& reference_;
@@ -48,7 +50,8 @@ class CauseColumns {
   std::vector<Group> groups_;
   std::vector<Column> columns_;
   int first_k1_ = -1, first_mount_ = -1, first_delay_ = -1, shutter_ = -1, drift_ = -1, first_pattern_ = -1,
-      first_lever_ = -1, first_zoom_ = -1;
+      first_lever_ = -1, first_zoom_ = -1, first_step_ = -1;
+  std::vector<double> steps_s_;
   std::optional<RotationView> view_;
   int frame_ = 0;
   double frame_time_s_ = 0.0;

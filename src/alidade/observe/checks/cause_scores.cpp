@@ -269,7 +269,7 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   const double effect = shared.value, likelihood = -s.dot(value), explained = likelihood / effect;
   const double chi2 = std::max(0.0, as_rare_chi2(explained, shared));
   const double count = 2.0 * static_cast<double>(reference_.bundle.observations.size());
-  CauseScore result{.name = group.name, .shift = step.head(n_)};
+  CauseScore result{.name = group.name, .shift = step.head(n_), .from_s = group.from_s};
   result.z = std::sqrt(cause.rank > 1.0 ? std::max(0.0, chi2 - 2.0 * (cause.rank - 1.0)) : chi2);
   result.gain = likely_share(group, cause, s, likelihood, effect) * explained - cause.rank * std::log(count);
   const VectorXd whole_unit = cause.unit.cwiseInverse();
@@ -283,12 +283,38 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   return result;
 }
 
+/// Of the steps only the one that explains most.
+void keep_best_step(std::vector<CauseScore>& scores) {
+  const auto is_step = [](const CauseScore& score) { return score.name == step_cause; };
+  const CauseScore* best = nullptr;
+  for (const CauseScore& score : scores)
+    if (is_step(score) && (best == nullptr || score.gain > best->gain)) best = &score;
+  if (best == nullptr) return;
+  const double from_s = best->from_s;
+  std::erase_if(scores, [&](const CauseScore& score) { return is_step(score) && score.from_s != from_s; });
+}
+
 }  // namespace
 
 std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& reference, const CauseConfig& config) {
-  const RotationBundle& bundle = reference.bundle;
-  if (bundle.frames.size() < 2 || bundle.frames.back().t_s <= bundle.frames.front().t_s) return {};
-  return Linearisation(log, reference, config).scores();
+  constexpr int num_steps = 8, num_closer = 16;
+  constexpr double asked = 5.0;
+  const std::vector<RotationFrame>& frames = reference.bundle.frames;
+  if (frames.size() < 2 || frames.back().t_s <= frames.front().t_s) return {};
+  const double apart_s = (frames.back().t_s - frames.front().t_s) / num_steps;
+  CauseConfig with_steps = config;
+  for (int k = 1; k < num_steps; ++k) with_steps.steps_s.push_back(frames.front().t_s + k * apart_s);
+  std::vector<CauseScore> scores = Linearisation(log, reference, with_steps).scores();
+  keep_best_step(scores);
+  const auto step = std::ranges::find(scores, std::string(step_cause), &CauseScore::name);
+  if (step == scores.end() || step->z < asked) return scores;
+  // When it was, more closely.
+  with_steps.steps_s.clear();
+  for (int k = 0; k <= num_closer; ++k)
+    with_steps.steps_s.push_back(step->from_s + (2.0 * k / num_closer - 1.0) * apart_s);
+  scores = Linearisation(log, reference, with_steps).scores();
+  keep_best_step(scores);
+  return scores;
 }
 
 }  // namespace alidade

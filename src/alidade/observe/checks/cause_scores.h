@@ -23,13 +23,19 @@ struct CauseScore {
   std::vector<CauseMember> members;
   Eigen::MatrixXd information;  ///< Of the members, by these residuals and what errors they share.
   CommonVector shift;           ///< Of the estimated parameters if it were free, normalised.
+  double from_s = not_seen;     ///< Of a step: from when.
 };
+
+/// A rotation of the camera on its mount (a bump), or of the angles' zero, at an instant that is not known: of several
+/// the one that explains most.
+inline constexpr const char* step_cause = "step of the mounting";
 
 struct CauseConfig {
   ObserveNuisances nuisances;  ///< What was estimated.
   double max_gap_s = 0.25;
   double height = 1.0;                   ///< Of the image, normalised: a rolling shutter's way.
   std::vector<std::string> errors = {};  ///< Causes among the rotation's errors that were estimated.
+  std::vector<double> steps_s = {};      ///< When the mounting may have had a step.
 };
 
 /// Score (Lagrange multiplier) tests of the reference, all from one linearisation: with point bearings and what was
@@ -37,8 +43,9 @@ struct CauseConfig {
 /// share errors in time χ² is divided by their design effect in the cause's own directions, taken after its step:
 /// a cause does not hide behind the scatter that it makes. Likewise where those of a track do, up to a factor of four.
 /// Tested: k1, k2, k3, p1 and p2, the lens whole; mount, delay, line time of a rolling shutter, lever arm (one parallax
-/// for all points, and each point's own along the view), a focal length that drifts, and the patterns of the log's
-/// rotation. Rotations that are estimated are eliminated with the points. Rao 1948; docs/maths/rotating-camera.md.
+/// for all points, and each point's own along the view), a focal length that drifts, a step of the mounting at some
+/// instant, and the patterns of the log's rotation. Rotations that are estimated are eliminated with the points. Rao
+/// 1948; docs/maths/rotating-camera.md.
 [[nodiscard]] std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& reference,
                                                    const CauseConfig& config);
 

@@ -8,6 +8,7 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t max_search_frames = 120, max_search_points = 40;
+constexpr double ordinary_step_rad = 0.02;
 
 /// What a trial frees beside what is estimated already.
 struct Trial {
@@ -74,20 +75,21 @@ int size_of_layout(const RotationLog& log, const ObserveSetup& config) {
   return CommonLayout(nuisances).size;
 }
 
-/// The log's frames, thinned, with the points that are seen most.
+/// The log's frames with the points that are seen most.
 struct Sample {
   std::vector<RotationFrame> frames;
   std::vector<std::vector<Eigen::Vector2d>> px;
 };
 
-Sample sample_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale) {
+Sample sample_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale,
+                 std::size_t max_points = max_search_points) {
   std::vector<std::pair<int, std::size_t>> seen(log.num_points);
   for (std::size_t i = 0; i < seen.size(); ++i) seen[i] = {0, i};
   for (const RotationRow& row : log.rows) {
     for (std::size_t i = 0; i < row.px.size(); ++i) seen[i].first -= is_seen(row.px[i]) ? 1 : 0;
   }
   std::sort(seen.begin(), seen.end());
-  seen.resize(std::min(seen.size(), max_search_points));
+  seen.resize(std::min(seen.size(), max_points));
   Sample sample;
   MotionReader reader(log.source, config.max_gap_s);
   for (const RotationRow& row : log.rows) {
@@ -102,15 +104,12 @@ Sample sample_of(const RotationLog& log, const ObserveSetup& config, const Pixel
   return sample;
 }
 
-/// σ of a pixel [px] with which all rows are explained; infinite: not at all.
-double noise_of(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report, const Sample& sample,
-                const Progress& progress) {
-  std::vector<RotationFrame> frames = sample.frames;
-  const std::vector<RotationError> errors = estimated_errors(log, config);
-  add_turns(log, errors, config.max_gap_s, frames);
+/// At most about so many of the frames.
+FrameBuffer buffer_of(const std::vector<RotationFrame>& frames, const Sample& sample,
+                      std::size_t max_frames = max_search_frames) {
   const std::size_t num_points = sample.px.empty() ? 0 : sample.px.front().size();
   FrameBuffer buffer(num_points, frames.size() + 1);
-  const std::size_t every = std::max<std::size_t>(1, frames.size() / max_search_frames);
+  const std::size_t every = std::max<std::size_t>(1, frames.size() / max_frames);
   bool is_new = false;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     is_new = is_new || frames[k].starts_segment;
@@ -119,20 +118,35 @@ double noise_of(const RotationLog& log, const ObserveSetup& config, const Observ
     is_new = false;
     buffer.add(frames[k], sample.px[k]);
   }
+  return buffer;
+}
+
+AdjustConfig trial_config(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
+                          int num_errors) {
   AdjustConfig adjust_with;
   adjust_with.nuisances = config.nuisances;
-  adjust_with.nuisances.errors = static_cast<int>(errors.size());
+  adjust_with.nuisances.errors = num_errors;
   adjust_with.with_depth = needs_depth(log, config);
   adjust_with.sigma_range_m = config.sigma_range_m;
   ObserveSetup sized = config;
   sized.width_px = report.width_px;
   sized.height_px = report.height_px;
   adjust_with.start = start_camera(sized, report.scale);
-  adjust_with.start.errors = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
+  adjust_with.start.errors = RotationErrors::Zero(num_errors);
   if (!log.rows.empty()) adjust_with.start.drift_from_s = log.rows.back().t_s;
   adjust_with.prior = said_prior(config, adjust_with.start);
   if (!config.start) adjust_with.other_starts = {2.5};
-  const Adjustment adjustment = adjust(buffer, adjust_with, progress);
+  return adjust_with;
+}
+
+/// σ of a pixel [px] with which all rows are explained; infinite: not at all.
+double noise_of(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report, const Sample& sample,
+                const Progress& progress) {
+  std::vector<RotationFrame> frames = sample.frames;
+  const std::vector<RotationError> errors = estimated_errors(log, config);
+  add_turns(log, errors, config.max_gap_s, frames);
+  const AdjustConfig adjust_with = trial_config(log, config, report, static_cast<int>(errors.size()));
+  const Adjustment adjustment = adjust(buffer_of(frames, sample), adjust_with, progress);
   const std::size_t seen = adjustment.num_rejected + adjustment.bundle.observations.size();
   constexpr double max_rejected = 0.4;  // beyond it no verdict stands
   if (!adjustment.has_value ||
@@ -141,6 +155,42 @@ double noise_of(const RotationLog& log, const ObserveSetup& config, const Observ
   }
   return adjustment.sigma_px * report.scale.scale;
 }
+
+/// Bundles of a log whose mounting has a step.
+class StepSearch {
+ public:
+  StepSearch(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
+             const Progress& progress)
+      : scale_(report.scale.scale),
+        sample_(sample_of(log, config, report.scale, max_points)),
+        adjust_with_(trial_config(log, config, report, 3)),
+        progress_(progress) {
+    adjust_with_.reject = false;
+  }
+  /// Of a rotation of the camera on its mount at that time, all pixels counted.
+  [[nodiscard]] MountingStep at(double t_s, std::size_t max_frames) const {
+    std::vector<RotationFrame> frames = sample_.frames;
+    for (RotationFrame& frame : frames) {
+      frame.turn_by = TurnByErrors::Zero(3, 3);
+      if (frame.t_s >= t_s) frame.turn_by.diagonal().setConstant(ordinary_step_rad);
+    }
+    const Adjustment adjustment = adjust(buffer_of(frames, sample_, max_frames), adjust_with_, progress_);
+    MountingStep step{t_s, Eigen::Vector3d::Zero(), std::numeric_limits<double>::infinity()};
+    if (!adjustment.has_value) return step;
+    step.rotation_rad = ordinary_step_rad * adjustment.solution.camera.errors.head<3>();
+    step.noise_px = adjustment.solution.rms_px * scale_;
+    return step;
+  }
+  [[nodiscard]] double from_s() const { return sample_.frames.front().t_s; }
+  [[nodiscard]] double until_s() const { return sample_.frames.back().t_s; }
+
+ private:
+  static constexpr std::size_t max_points = 16;
+  double scale_;
+  Sample sample_;
+  AdjustConfig adjust_with_;
+  const Progress& progress_;
+};
 
 }  // namespace
 
@@ -171,6 +221,39 @@ std::optional<ObserveSetup> searched_causes(const RotationLog& log, const Observ
     if (found.back().first < max_noise_px && found.back().first < as_well * least) return found.back().second;
   }
   return std::nullopt;
+}
+
+std::optional<MountingStep> mounting_step(const RotationLog& log, const ObserveSetup& config,
+                                          const ObserveSolution& report, double max_noise_px, double max_share,
+                                          const Progress& progress) {
+  constexpr int num_times = 12;
+  constexpr std::size_t few_frames = 60, many_frames = 120;
+  // Missed by half of the time between two trials a step leaves about half of the residuals; what is none, nearly all.
+  constexpr double hardly = 0.7;
+  if (log.source == RotationSource::none || log.rows.size() < 10 || log.num_points < 2) return std::nullopt;
+  const StepSearch search(log, config, report, progress);
+  const double duration_s = search.until_s() - search.from_s();
+  const double without_px = search.at(search.until_s() + 1.0, few_frames).noise_px;
+  // A mounting that is askew throughout is no step.
+  const double askew_px = config.nuisances.mount ? without_px : search.at(search.from_s(), few_frames).noise_px;
+  const double enough_px = std::min(max_noise_px, max_share * std::min(without_px, askew_px));
+  MountingStep best{search.from_s(), Eigen::Vector3d::Zero(), std::numeric_limits<double>::infinity()};
+  double reach_s = duration_s / num_times;
+  const double first_s = search.from_s() + 0.5 * reach_s, last_s = search.until_s() - 0.5 * reach_s;
+  for (int k = 1; k < num_times; ++k) {
+    const MountingStep tried = search.at(search.from_s() + k * reach_s, few_frames);
+    if (tried.noise_px < best.noise_px) best = tried;
+  }
+  if (!(best.noise_px < std::max(enough_px, hardly * without_px))) return std::nullopt;
+  best = search.at(best.t_s, many_frames);
+  for (; reach_s > duration_s / static_cast<double>(many_frames); reach_s *= 0.5) {
+    for (const double by_s : {-0.5 * reach_s, 0.5 * reach_s}) {
+      const MountingStep tried = search.at(std::clamp(best.t_s + by_s, first_s, last_s), many_frames);
+      if (tried.noise_px < best.noise_px) best = tried;
+    }
+  }
+  if (!(best.noise_px < enough_px)) return std::nullopt;
+  return best;
 }
 
 bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,

@@ -12,6 +12,12 @@ namespace alidade {
                                                           const ObserveSolution& report, double max_noise_px,
                                                           const Progress& progress);
 
+/// The rotation of the camera on its mount at one instant (a bump) that explains all rows with less noise than
+/// `max_noise_px` and than `max_share` of what there is without. For logs that no one camera explains.
+[[nodiscard]] std::optional<MountingStep> mounting_step(const RotationLog& log, const ObserveSetup& config,
+                                                        const ObserveSolution& report, double max_noise_px,
+                                                        double max_share, const Progress& progress);
+
 /// Does the focal length change within most seconds of the log, so that one that grows or shrinks explains them clearly
 /// better?
 [[nodiscard]] bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,

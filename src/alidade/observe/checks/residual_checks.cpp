@@ -34,10 +34,21 @@ std::string size_of(const CauseScore& cause) {
          (worst->unit.empty() ? "" : " " + worst->unit);
 }
 
+constexpr const char* step_advice =
+    "was the camera or its lens bumped, or the head zeroed anew? part the log there, each part has a mounting of its "
+    "own";
+
+/// To a hundredth of a second, of whatever beginning.
+std::string time_text(double t_s) {
+  const double digits = std::floor(std::log10(std::max(std::abs(t_s), 1.0))) + 3.0;
+  return text_of(t_s, static_cast<int>(digits)) + " s";
+}
+
 bool is_zoom(const CauseScore& cause) { return cause.name == "focal length that varies"; }
 
 std::string advice_for(const CauseScore& cause) {
   if (is_zoom(cause)) return "one camera is no answer: let zoom and focus rest, or stay as they are";
+  if (cause.name == step_cause) return step_advice;
   const std::string word = estimate_word_of(cause.name);
   if (word == "scale") return "measure the scale with a known rotation, or --estimate scale --sigma-encoder-scale S";
   return "--estimate " + word;
@@ -127,6 +138,19 @@ Check lasting_check(const ObserveSolution& report) {
                    : "every pixel errs by itself";
   if (check.value > most) check.state = State::care;
   return check;
+}
+
+/// Of a camera that was rotated on its mount by so much.
+Check step_check(const MountingStep& step) {
+  const double angle_deg = step.rotation_rad.norm() / degree;
+  return {std::string("needs ") + step_cause,
+          step.is_counted ? State::care : State::bad,
+          "all rows are of one camera if it has a " + std::string(step_cause) + " at " + time_text(step.t_s) + " (" +
+              text_of(angle_deg, 2) + "°): " + step_advice,
+          angle_deg,
+          0.0,
+          "°",
+          "residuals"};
 }
 
 /// Do the residuals of a frame rotate together? An encoder's or a gyroscope's noise, which every row has again.
@@ -220,12 +244,14 @@ double asked_beyond(const ObserveSolution& report) {
 
 std::vector<Check> residual_checks(const ObserveSolution& report) {
   std::vector<Check> checks;
+  if (report.mounting_step) checks.push_back(step_check(*report.mounting_step));
   const auto asked = asked_for(report);
   constexpr std::size_t max_named = 4;
   for (std::size_t i = 0; i < std::min(asked.size(), max_named); ++i) {
     const CauseScore& cause = *asked[i];
     std::string text = i == 0 ? "the residuals indicate " : "and ";
-    text += cause.name + " (" + size_of(cause) + "; " + text_of(cause.z, 2) + "σ)";
+    text += cause.name + (std::isfinite(cause.from_s) ? " at " + time_text(cause.from_s) : "") + " (" + size_of(cause) +
+            "; " + text_of(cause.z, 2) + "σ)";
     if (i == 0) text += ": " + advice_for(cause);
     const State state = i == 0 && is_zoom(cause) ? State::bad : State::care;
     checks.push_back({"needs " + cause.name, state, text, cause.z, asked_beyond(report), "σ", "residuals"});

@@ -76,12 +76,18 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
                   ObserveSolution& report) {
   constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
   constexpr double more = 0.05;  // of the pixels: rows of another focal length are rejected together, and raise nothing
+  constexpr double as_well = 1.1, less = 0.9;  // than the zooms, and than neither: a step of the mounting
   const bool is_known = config.rotation == RotationKnowledge::known;
-  if (!has_zoom(report) || !is_known || !is_answer(report) || config.method != ObserveMethod::hybrid) return;
+  if (!has_zoom(report) || report.mounting_step || !is_known || !is_answer(report) ||
+      config.method != ObserveMethod::hybrid)
+    return;
   ObserveSetup whole = config;
   whole.method = ObserveMethod::batch;
   ObserveSolution all = solve_as_given(log, whole, progress);
-  if (!is_answer(all)) return;
+  if (!is_answer(all)) {
+    report.mounting_step = mounting_step(log, config, report, as_well * report.sigma_px, less, progress);
+    return;
+  }
   const bool rejects_rows = rejected_share(all) > rejected_share(report) + more;
   if ((all.sigma_px < nearly * report.sigma_px && !rejects_rows) || config.no_zoom) {
     const IntrinsicsEstimate last = all.steps.back();
@@ -90,6 +96,13 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
     all.events = std::move(report.events);
     all.nis_per_dof = report.nis_per_dof;
     report = std::move(all);
+    return;
+  }
+  // A camera that was bumped: each part of the log seems to be of another one.
+  if (const auto step = mounting_step(log, config, report, as_well * report.sigma_px, less, progress)) {
+    report = std::move(all);
+    report.mounting_step = step;
+    report.mounting_step->is_counted = true;
     return;
   }
   constexpr double far_off = 3.0;  // the noise of one camera's rows beside a real zoom's: nothing is determined by them
@@ -274,6 +287,16 @@ void find_causes(const RotationLog& log, const ObserveSetup& given, const Progre
   free_one_by_one(log, progress, config, report, rivals);
 }
 
+/// What nothing else explains, and is of no zoom, may be a bump.
+void seek_step(const RotationLog& log, const ObserveSetup& config, const Progress& progress, ObserveSolution& report) {
+  constexpr double much_less = 0.6, max_ordinary_px = 2.0;
+  if (report.mounting_step || !is_answer(report) || !is_doubtful(report) || has_zoom(report)) return;
+  const CauseScore* best = best_cause(report);
+  if (best != nullptr && best->name != step_cause) return;
+  report.mounting_step = mounting_step(log, config, report, max_ordinary_px, much_less, progress);
+  if (report.mounting_step) report.mounting_step->is_counted = true;
+}
+
 }  // namespace
 
 ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& given, const Progress& progress) {
@@ -288,13 +311,15 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   // No cause explains a rotation that is read otherwise than it was meant: seconds are not spent on looking for one.
   Misread misread;
   if (is_judged && is_gross(report)) misread = misread_rotation(log, config, report, progress);
-  if (config.estimate_auto && is_judged && !misread.explains_all) {
+  if (config.estimate_auto && is_judged && !misread.explains_all && !report.mounting_step) {
     find_causes(log, given, progress, config, report, rivals);
   } else if (config.estimate_auto && !is_known) {
     free_one_by_one(log, progress, config, report, rivals);
   }
   prefer_all_rows(log, config, progress, report);
-  if (is_judged && !config.no_zoom && !misread.explains_all && never_rests(log, config, report, progress)) {
+  if (is_judged && !misread.explains_all) seek_step(log, config, progress, report);
+  if (is_judged && !config.no_zoom && !misread.explains_all && !report.mounting_step &&
+      never_rests(log, config, report, progress)) {
     report.status = Status::focal_length_varies;
   }
   if (is_answer(report)) {

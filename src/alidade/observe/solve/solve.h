@@ -14,6 +14,14 @@
 
 namespace alidade {
 
+/// The camera was rotated on its mount at one instant: bumped, or taken off and put back.
+struct MountingStep {
+  double t_s = 0.0;              ///< From this row on.
+  Eigen::Vector3d rotation_rad;  ///< About the mount's axes.
+  double noise_px = 0.0;         ///< Of a pixel, with it.
+  bool is_counted = false;       ///< In the answer's σ, by what blocks of time scatter.
+};
+
 /// The report with the intermediate results that its verdict, bound and tests are based on.
 struct ObserveSolution : ObserveReport {
   PixelScale scale;
@@ -32,6 +40,7 @@ struct ObserveSolution : ObserveReport {
   std::vector<std::string> estimated_errors;
   RotationErrors errors;           ///< Of the rotation, as estimated, in units of their ordinary sizes.
   std::vector<Check> side_checks;  ///< What else explains the residuals as well, and what the pixels do not determine.
+  std::optional<MountingStep> mounting_step;
   std::string misread;             ///< How the rotation seems to be misread, in words; empty: it is not.
   bool sigma_is_distance = false;  ///< The method has no σ: stated is its distance from the reference.
 };

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
@@ -176,11 +177,29 @@ void add_readings(std::span<const ServoSample> log, const ServoIdentification& i
                               step_rad, 2.0 * identified.fit.rms_rad, "rad", ""});
 }
 
+/// Times of which a part is in another unit: rows hundreds of times further apart at one end than at the other.
+std::optional<Verdict> mixed_units(std::span<const ServoSample> log) {
+  constexpr double least_ratio = 200.0;
+  const std::size_t some = log.size() / 8;
+  if (some < 2) return std::nullopt;
+  const auto spacing_s = [&](std::size_t first) {  // the median: a pause is no other unit
+    std::vector<double> apart_s;
+    for (std::size_t i = first; i < first + some; ++i) apart_s.push_back(log[i + 1].t_s - log[i].t_s);
+    return median_of(apart_s);
+  };
+  const double first_s = spacing_s(0), last_s = spacing_s(log.size() - 1 - some);
+  if (!(std::max(first_s, last_s) > least_ratio * std::min(first_s, last_s))) return std::nullopt;
+  return refused("rows are " + text_of(first_s, 2) + " s apart in the beginning, " + text_of(last_s, 2) +
+                     " s in the end: a part of the times is in another unit",
+                 "write all of t_s in seconds");
+}
+
 /// What the log does not determine; nothing where it determines gain, time constant and latency.
 std::optional<Verdict> refusal(std::span<const ServoSample> log, const ServoIdentification& identified) {
   const std::string excite = "log a step or a chirp of the command that moves the axis by degrees";
   if (log.size() < 20)
     return refused("only " + std::to_string(log.size()) + " rows: too few for five parameters", "log at least 20 rows");
+  if (auto mixed = mixed_units(log)) return mixed;
   if (!(identified.command_range > 0.0))
     return refused("no excitation: the command is " + text_of(log.front().command) + " throughout", excite);
   const ServoFit& fit = identified.fit;

@@ -210,6 +210,18 @@ TEST(ServoLogTimes, CommandsAtRowsStayThere) {
   }
 }
 
+/// Milliseconds from the middle of a log on: "no answer: the gain is not distinguishable from zero".
+TEST(ServoLogTimes, TimesInTwoUnitsAreNamed) {
+  std::vector<ServoSample> log = log_of(late_scene(false));
+  for (std::size_t i = log.size() / 2; i < log.size(); ++i) log[i].t_s *= 1000.0;
+  const Verdict verdict = identify(log).verdict;
+  EXPECT_EQ(verdict.state, State::refused);
+  EXPECT_NE(verdict.sentence.find("another unit"), std::string::npos) << verdict.sentence;
+  std::vector<ServoSample> paused = log_of(late_scene(false));
+  for (std::size_t i = paused.size() - 10; i < paused.size(); ++i) paused[i].t_s += 1000.0;
+  EXPECT_EQ(identify(paused).verdict.sentence.find("another unit"), std::string::npos);
+}
+
 /// An encoder that begins again at half a turn: unwrapped, and said.
 TEST(ServoLogTimes, AnEncoderThatBeginsAgainIsUnwrapped) {
   for (const bool is_rate_plant : {false, true}) {

@@ -1,6 +1,11 @@
 #include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
+#include "alidade/estimation/verdict.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/rig/rig_work.h"
 
@@ -21,38 +26,145 @@ bool is_suspicious(const RigReport& report) {
 
 /// Another reading of the same table, by which its views may agree.
 struct Misreading {
-  const char* words;
+  std::string words;
   std::vector<HeadView> views;
+  bool is_exchange = false;
 };
 
-std::vector<Misreading> misreadings(std::span<const HeadView> views) {
-  const std::vector<HeadView> given(views.begin(), views.end());
-  std::vector<Misreading> all{{"pan and tilt are exchanged: the views agree with each in the other's column", given}};
-  for (HeadView& view : all[0].views) view.pan_tilt_rad.reverseInPlace();
-  for (const bool is_late : {true, false}) {
-    Misreading& shifted = all.emplace_back(Misreading{
-        is_late ? "the angles are those of the view before: the views agree with each row's angles one row earlier"
-                : "the angles are those of the view after: the views agree with each row's angles one row later",
-        given});
-    for (std::size_t v = 0; v < given.size(); ++v)
-      shifted.views[v].pan_tilt_rad = given[(v + (is_late ? 1 : given.size() - 1)) % given.size()].pan_tilt_rad;
+/// Each view of a head, or of all, with the angles of the one before, or after.
+std::vector<HeadView> shifted(std::span<const HeadView> given, std::optional<int> head, bool is_late) {
+  std::vector<HeadView> views(given.begin(), given.end());
+  std::vector<std::size_t> own;
+  for (std::size_t v = 0; v < given.size(); ++v)
+    if (!head || given[v].head == *head) own.push_back(v);
+  for (std::size_t k = 0; k < own.size(); ++k)
+    views[own[k]].pan_tilt_rad = given[own[(k + (is_late ? 1 : own.size() - 1)) % own.size()]].pan_tilt_rad;
+  return views;
+}
+
+/// Of all heads, then of each.
+std::vector<Misreading> misreadings(std::span<const HeadView> given) {
+  std::set<int> ids;
+  for (const HeadView& view : given) ids.insert(view.head);
+  std::vector<std::optional<int>> heads{std::nullopt};
+  if (ids.size() > 1) heads.insert(heads.end(), ids.begin(), ids.end());
+  std::vector<Misreading> all;
+  for (const std::optional<int> head : heads) {
+    const std::string of = head ? " of head " + std::to_string(*head) : "";
+    std::vector<HeadView> exchanged(given.begin(), given.end());
+    for (HeadView& view : exchanged)
+      if (!head || view.head == *head) view.pan_tilt_rad.reverseInPlace();
+    all.push_back({"pan and tilt" + of + " are exchanged: the views agree with each in the other's column",
+                   std::move(exchanged), true});
+    all.push_back(
+        {"the angles" + of + " are those of the view before: the views agree with each row's angles one row earlier",
+         shifted(given, head, true)});
+    all.push_back(
+        {"the angles" + of + " are those of the view after: the views agree with each row's angles one row later",
+         shifted(given, head, false)});
   }
   return all;
 }
 
-/// Why views that contradict each other may do so: as they are read otherwise, they agree.
+/// Whether a change of the table makes its views agree far better: in their readings, or in that none is rejected.
+bool is_far_better(const RigReport& otherwise, const RigReport& given) {
+  constexpr double far = 2.0, as_good = 1.2;
+  if (otherwise.status != Status::converged || otherwise.views_dropped > given.views_dropped) return false;
+  const double ratio = otherwise.sigma_encoder_rad / given.sigma_encoder_rad;
+  return (otherwise.sigma_encoder_is_estimated && ratio < 1.0 / far) ||
+         (otherwise.views_dropped + 2 <= given.views_dropped && 20 * otherwise.views_dropped < otherwise.views_used &&
+          ratio < as_good);
+}
+
+/// Why views that contradict each other may do so: as they are read otherwise, they agree. Of views of which a few were
+/// rejected, or whose readings scatter, only whether pan and tilt are exchanged.
 void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                          const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress,
                          RigReport& report) {
   constexpr std::size_t min_views = 8;
+  constexpr double uneasy_rad = 0.05 * degree;
+  const bool is_bad = is_suspicious(report);
+  const bool is_uneasy = 20 * report.views_dropped > report.views_used ||
+                         (report.sigma_encoder_is_estimated && report.sigma_encoder_rad > uneasy_rad);
   if (report.status == Status::degrees || report.status == Status::mirrored || views.size() < min_views) return;
+  if (!is_bad && !is_uneasy) return;
+  std::optional<RigReport> best;
   for (const Misreading& other : misreadings(views)) {
+    if (!is_bad && !other.is_exchange) continue;
     const RigReport otherwise = calibrated_with(other.views, points_in_board, cameras, config, {}, progress);
     if (otherwise.status != Status::converged || is_suspicious(otherwise)) continue;
-    report.status = Status::misread;
-    report.misreading = other.words;
-    return;
+    if (!is_bad && !is_far_better(otherwise, report)) continue;
+    if (best && std::pair(otherwise.views_dropped, otherwise.sigma_encoder_rad) >=
+                    std::pair(best->views_dropped, best->sigma_encoder_rad))
+      continue;
+    best = otherwise;
+    best->misreading = other.words;
   }
+  if (!best) return;
+  report.status = Status::misread;
+  report.misreading = best->misreading;
+  report.misreading_remedy = "give each view what its own pan and tilt encoders read";
+}
+
+/// The boards whose views' readings are corrected by more than others', or of which two views or more are rejected.
+std::set<int> odd_boards(std::span<const HeadView> views, const RigReport& report) {
+  constexpr double min_ratio = 2.0;
+  std::map<int, std::pair<double, double>> squares;  // and how many
+  std::map<int, int> rejected;
+  double sum = 0.0, num = 0.0;
+  for (std::size_t v = 0; v < views.size() && v < report.views.size(); ++v) {
+    if (!report.views[v].used) {
+      ++rejected[views[v].board];
+      continue;
+    }
+    const double square = report.views[v].reading_correction_rad.squaredNorm();
+    squares[views[v].board].first += square;
+    squares[views[v].board].second += 1.0;
+    sum += square;
+    num += 1.0;
+  }
+  std::set<int> odd;
+  for (const auto& [board, of] : squares)
+    if (of.first * num > min_ratio * sum * of.second) odd.insert(board);
+  for (const auto& [board, num_rejected] : rejected)
+    if (num_rejected > 1) odd.insert(board);
+  return odd;
+}
+
+/// A board that moved between two of its views: with another pose from there on the readings agree far better. Noise
+/// that is estimated from the residuals hides it; two poses instead of one would by chance lower it by a few
+/// hundredths.
+void look_for_moved_board(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                          const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress,
+                          RigReport& report) {
+  constexpr std::size_t min_views = 2;
+  int unused = 0;
+  for (const HeadView& view : views) unused = std::max(unused, view.board + 1);
+  RigReport best = report;
+  std::string words;
+  for (const int board : odd_boards(views, report)) {
+    std::vector<std::size_t> own;
+    for (std::size_t v = 0; v < views.size(); ++v)
+      if (views[v].board == board) own.push_back(v);
+    for (std::size_t first = min_views; first + min_views <= own.size(); ++first) {
+      std::vector<HeadView> moved(views.begin(), views.end());
+      for (std::size_t k = first; k < own.size(); ++k) moved[own[k]].board = unused;
+      const RigReport otherwise = calibrated_with(moved, points_in_board, cameras, config, {}, progress);
+      if (!is_far_better(otherwise, report) || otherwise.views_dropped > best.views_dropped ||
+          (otherwise.views_dropped == best.views_dropped && otherwise.sigma_encoder_rad > best.sigma_encoder_rad))
+        continue;
+      best = otherwise;
+      words = "board " + std::to_string(board) + " moved between " + views[own[first - 1]].seen.photo + " and " +
+              views[own[first]].seen.photo + ": with two poses of it the views agree (σ of a reading " +
+              text_of(otherwise.sigma_encoder_rad / degree, 2) + "° for " +
+              text_of(report.sigma_encoder_rad / degree, 2) + "°, " + std::to_string(otherwise.views_dropped) +
+              " rejected for " + std::to_string(report.views_dropped) + ")";
+    }
+  }
+  if (words.empty()) return;
+  report.status = Status::misread;
+  report.misreading = words;
+  report.misreading_remedy = "give the views of a board that was moved a board number of their own";
 }
 
 }  // namespace
@@ -68,7 +180,9 @@ RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::
   }
   const bool is_alone = report.status == Status::converged || report.status == Status::no_convergence ||
                         report.status == Status::degenerate;
-  if (is_alone && is_suspicious(report)) look_for_misreading(views, points_in_board, cameras, config, progress, report);
+  if (is_alone) look_for_misreading(views, points_in_board, cameras, config, progress, report);
+  if (report.status == Status::converged)
+    look_for_moved_board(views, points_in_board, cameras, config, progress, report);
   return report;
 }
 

@@ -77,7 +77,7 @@ struct RigReport {
     degrees,     ///< The readings are degrees.
     swapped,     ///< The cameras belong to the other heads.
     mirrored,    ///< A head sees its boards from behind: its images are mirrored.
-    misread,     ///< The readings are not where they belong; `misreading` says how.
+    misread,     ///< The table is not as it was taken; `misreading` says how.
     no_convergence
   };
   Status status = Status::too_few;
@@ -96,7 +96,8 @@ struct RigReport {
   std::vector<HeadViewFit> views;    ///< One per view.
   std::vector<HeadCover> covers;     ///< One per head.
   int mirrored_head = 0;             ///< Its id, where one is.
-  std::string misreading;            ///< The change of the readings that makes the views agree; empty: none is needed.
+  std::string misreading;            ///< The change of the table that makes the views agree; empty: none is needed.
+  std::string misreading_remedy;     ///< What to give instead.
   std::vector<std::string> unknown;  ///< Parameters of the combination that is unobservable.
   double sigma_px = 0.0, sigma_encoder_rad = 0.0;
   bool sigma_px_is_estimated = false, sigma_encoder_is_estimated = false;  ///< From the residuals.

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/simulate/rig.h"
+#include "alidade/testing/rig_sample.h"
 #include "alidade/testing/rig_trial.h"
 #include "alidade/testing/trials.h"
 
@@ -110,6 +113,67 @@ TEST(RigByNeed, LeavesACleanRigAsItIs) {
       EXPECT_LT(std::abs(one.value - one.was), 4.5 * one.sigma) << one.name;
   }
   EXPECT_EQ(freed, 0);
+}
+
+/// Of what the table says of one head alone, or of a board that was moved, the verdict says which.
+void expect_named(const std::string& words,
+                  const std::function<void(const RigScene&, std::uint64_t, std::vector<HeadView>&)>& change,
+                  const RigSceneConfig& config = {}) {
+  const auto draws = static_cast<std::uint64_t>(testing::trials(1));
+  for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+    const RigScene scene = draw_rig_scene(config, seed);
+    std::vector<HeadView> views = simulate_head_views(scene, {}, seed).views;
+    change(scene, seed, views);
+    const RigReport report = calibrate_rig(views, points_in_board(scene.board), testing::cameras_of(scene.rig), {});
+    const Verdict verdict = rig_verdict(report, {});
+    EXPECT_EQ(verdict.exit_code, ExitCode::undetermined) << seed;
+    EXPECT_NE(verdict.sentence.find(words), std::string::npos)
+        << seed << ": " << verdict.sentence << report.views_dropped << " rejected, "
+        << report.sigma_encoder_rad / degree;
+  }
+}
+
+TEST(RigTable, ExchangedAnglesOfOneHeadAreNamed) {
+  expect_named("pan and tilt of head 2 are exchanged",
+               [](const RigScene&, std::uint64_t, std::vector<HeadView>& views) {
+                 for (HeadView& view : views)
+                   if (view.head == 2) view.pan_tilt_rad.reverseInPlace();
+               });
+}
+
+TEST(RigTable, AnglesOfTheViewBeforeOfOneHeadAreNamed) {
+  expect_named("the angles of head 2 are those of the view before",
+               [](const RigScene&, std::uint64_t, std::vector<HeadView>& views) {
+                 std::optional<Eigen::Vector2d> before;
+                 for (HeadView& view : views) {
+                   if (view.head != 2) continue;
+                   const Eigen::Vector2d own = view.pan_tilt_rad;
+                   if (before) view.pan_tilt_rad = *before;
+                   before = own;
+                 }
+               });
+}
+
+/// Between the views of the first head and those of the second it was moved by 3 cm.
+TEST(RigTable, ABoardThatMovedIsNamed) {
+  RigSceneConfig config;
+  config.max_views_of_a_board = 6;
+  config.num_boards = 8;
+  const auto move = [](const RigScene& scene, std::uint64_t, std::vector<HeadView>& views) {
+    constexpr int board = 2;
+    const std::vector<Eigen::Vector3d> points = points_in_board(scene.board);
+    for (HeadView& view : views) {
+      if (view.board != board || view.head != 2) continue;
+      for (Corner& corner : view.seen.corners) {
+        const Eigen::Vector3d at = scene.world_from_board[board] * points[static_cast<std::size_t>(corner.index)];
+        const auto before = project(scene.rig.heads[1], view.pan_tilt_rad, at);
+        const auto after = project(scene.rig.heads[1], view.pan_tilt_rad, at + Eigen::Vector3d(0.03, 0.0, 0.01));
+        ASSERT_TRUE(before && after);
+        corner.px += after->px - before->px;
+      }
+    }
+  };
+  expect_named("board 2 moved between", move, config);
 }
 
 }  // namespace

@@ -83,8 +83,7 @@ Verdict refusal_by_status(const RigReport& report) {
               " sees its boards from behind: its images are mirrored, or corners are counted the other way",
           "give images as the camera takes them (no mirror, no flip), corners row by row, left to right");
     case RigStatus::misread:
-      return rig_refusal(State::refused, ExitCode::undetermined, report.misreading,
-                         "give each view what its own pan and tilt encoders read");
+      return rig_refusal(State::refused, ExitCode::undetermined, report.misreading, report.misreading_remedy);
     case RigStatus::not_linked:
       return refusal_by_link(report);
     default:

@@ -2,9 +2,13 @@
 
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
 
 #include "alidade/calibrate.h"
+#include "alidade/files/files.h"
 #include "alidade/results/photos_outcome.h"
+#include "alidade/results/result_board.h"
 #include "alidade/results/shots_outcome.h"
 #include "alidade/testing/calibration_sample.h"
 
@@ -54,6 +58,21 @@ TEST(Plans, AnswerWhatCannotBe) {
     beam.sigma_spot_px = bad;
     EXPECT_THROW((void)plan_shots(beam), ConfigError) << bad;
   }
+}
+
+/// `plan rangefinder` reserved room for as many corners as the file said.
+TEST(Plans, ABoardOfAResultThatIsNoneIsRefused) {
+  const nlohmann::json right{{"kind", "chessboard"}, {"cols", 9}, {"rows", 6}, {"square_m", 0.04}, {"marker_m", 0.0}};
+  EXPECT_EQ(result_board(right).cols, 9);
+  for (const char* key : {"cols", "rows", "square_m"})
+    for (const double bad : {-1.0, 0.0, key == std::string("square_m") ? -1e300 : 1e300}) {
+      nlohmann::json wrong = right;
+      wrong[key] = bad;
+      EXPECT_THROW((void)result_board(wrong), InputError) << key << ' ' << bad;
+    }
+  nlohmann::json wrong = right;
+  wrong["kind"] = "none";
+  EXPECT_THROW((void)result_board(wrong), InputError);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "alidade/formats/beam_file.h"
 #include "alidade/formats/camera_file.h"
+#include "alidade/results/result_board.h"
 #include "alidade/results/result_document.h"
 
 namespace alidade {
@@ -26,14 +27,7 @@ BeamNow read_rangefinder(const std::filesystem::path& result) {
     now.sigma_corner_px = std::max(0.01, estimate.at("noise").at("sigma_corner_px").get<double>());
     now.estimate_scale = json.at("stddev").at("scale").get<double>() > 0.0;
     Board board{.cols = 9, .rows = 6, .square_m = 0.04};
-    if (estimate.contains("board")) {
-      const Json& b = estimate.at("board");
-      board.kind = board_kind(b.at("kind").get<std::string>()).value_or(BoardKind::chessboard);
-      board.cols = b.at("cols").get<int>();
-      board.rows = b.at("rows").get<int>();
-      board.square_m = b.at("square_m").get<double>();
-      board.marker_m = b.at("marker_m").get<double>();
-    }
+    if (estimate.contains("board")) board = result_board(estimate.at("board"));
     now.points_in_board = points_in_board(board);
   } catch (const Json::exception&) {
     throw InputError(file.string() + ": not a result.json of alidade rangefinder");

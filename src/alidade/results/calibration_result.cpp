@@ -24,7 +24,7 @@ CalibratedNow read_calibration(const std::filesystem::path& result) {
     const auto& estimate = json.at("estimate");
     found.noise_px = estimate.at("noise_px").get<double>();
     if (estimate.contains("sigma")) found.design_effect = estimate["sigma"].value("design_effect", 1.0);
-    found.board = result_board(estimate.at("board"));
+    found.board = result_board(estimate.at("board").dump());
   } catch (const nlohmann::json::exception&) {
     throw InputError(file.string() + ": not a result.json of alidade calibrate");
   } catch (const InputError& error) {

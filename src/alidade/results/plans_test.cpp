@@ -63,16 +63,16 @@ TEST(Plans, AnswerWhatCannotBe) {
 /// `plan rangefinder` reserved room for as many corners as the file said.
 TEST(Plans, ABoardOfAResultThatIsNoneIsRefused) {
   const nlohmann::json right{{"kind", "chessboard"}, {"cols", 9}, {"rows", 6}, {"square_m", 0.04}, {"marker_m", 0.0}};
-  EXPECT_EQ(result_board(right).cols, 9);
+  EXPECT_EQ(result_board(right.dump()).cols, 9);
   for (const char* key : {"cols", "rows", "square_m"})
     for (const double bad : {-1.0, 0.0, key == std::string("square_m") ? -1e300 : 1e300}) {
       nlohmann::json wrong = right;
       wrong[key] = bad;
-      EXPECT_THROW((void)result_board(wrong), InputError) << key << ' ' << bad;
+      EXPECT_THROW((void)result_board(wrong.dump()), InputError) << key << ' ' << bad;
     }
   nlohmann::json wrong = right;
   wrong["kind"] = "none";
-  EXPECT_THROW((void)result_board(wrong), InputError);
+  EXPECT_THROW((void)result_board(wrong.dump()), InputError);
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ BeamNow read_rangefinder(const std::filesystem::path& result) {
     now.sigma_corner_px = std::max(0.01, estimate.at("noise").at("sigma_corner_px").get<double>());
     now.estimate_scale = json.at("stddev").at("scale").get<double>() > 0.0;
     Board board{.cols = 9, .rows = 6, .square_m = 0.04};
-    if (estimate.contains("board")) board = result_board(estimate.at("board"));
+    if (estimate.contains("board")) board = result_board(estimate.at("board").dump());
     now.points_in_board = points_in_board(board);
   } catch (const Json::exception&) {
     throw InputError(file.string() + ": not a result.json of alidade rangefinder");

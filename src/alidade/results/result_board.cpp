@@ -6,7 +6,8 @@
 
 namespace alidade {
 
-Board result_board(const nlohmann::json& json) {
+Board result_board(const std::string& text) {
+  const auto json = nlohmann::json::parse(text);
   Board board;
   const auto kind = board_kind(json.value("kind", "chessboard"));
   if (!kind) throw InputError("estimate.board.kind is not a kind of board");

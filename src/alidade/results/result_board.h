@@ -1,12 +1,12 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <string>
 
 #include "alidade/board/board.h"
 
 namespace alidade {
 
-/// The board in the estimate of a result.json. Throws InputError where it is none.
-[[nodiscard]] Board result_board(const nlohmann::json& json);
+/// The board in the estimate of a result.json, from its JSON text. Throws InputError where it is none.
+[[nodiscard]] Board result_board(const std::string& json);
 
 }  // namespace alidade

@@ -14,19 +14,22 @@ struct Candidate {
   double sum2 = std::numeric_limits<double>::infinity();
 };
 
-/// The fit with one more flaw, from the two sizes that explain most.
+/// The fit with one more flaw, from the two sizes that explain most; of a limit of rate also from one that hardly
+/// limits: a step beyond what is reached changes nothing, and does not come back.
 Candidate freed(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
   constexpr std::size_t max_starts = 2;
   constexpr int first_steps = 8, max_steps = 40;
   const std::vector<FlawScore> scores = flaw_scores(log, fit, ground, flaw);
   Candidate best{flaw, fit};
-  for (std::size_t i = 0; i < std::min(max_starts, scores.size()); ++i) {
+  const auto start = [&](double size) {
     ServoFit trial = fit;
     trial.freed.push_back(flaw);
-    trial.flaws.*servo_flaws[flaw] = scores[i].size;
+    trial.flaws.*servo_flaws[flaw] = size;
     const double sum2 = refine_flawed(log, first_steps, trial);
     if (sum2 < best.sum2) best = {flaw, trial, sum2};
-  }
+  };
+  for (std::size_t i = 0; i < std::min(max_starts, scores.size()); ++i) start(scores[i].size);
+  if (flaw == ServoFlaw::rate_limit) start(std::ranges::max_element(scores, {}, &FlawScore::size)->size);
   if (std::isfinite(best.sum2)) best.sum2 = refine_flawed(log, max_steps, best.fit);
   return best;
 }

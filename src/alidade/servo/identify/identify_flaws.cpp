@@ -178,7 +178,7 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
   };
   switch (flaw) {
     case ServoFlaw::rate_limit:
-      return times(max_rate(log, response), {0.95, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1});
+      return times(max_rate(log, response), {0.99, 0.95, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1});
     case ServoFlaw::acceleration_limit:
       return times(max_rate(log, response) / fit.params[ServoParam::tau], {0.9, 0.7, 0.5, 0.3, 0.15});
     case ServoFlaw::dead_band:

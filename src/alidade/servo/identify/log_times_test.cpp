@@ -199,6 +199,20 @@ TEST(ServoLogTimes, CommandsThatDriftBetweenRowsAreNoClockForSure) {
 }
 
 /// Commands at rows are not moved: the numbers are those of the plain model.
+/// A limit just below what is commanded is no command between rows: a fit of it that stepped beyond the limit stayed
+/// there, and the commands' times took it over (two of these ●, gain 14σ off).
+TEST(ServoLogTimes, ALimitThatHardlyLimitsIsNoCommandBetweenRows) {
+  for (const std::uint64_t seed : {9004u, 9006u, 9009u}) {
+    ServoLogScene scene = scene_of(true, false);
+    std::get<RatePlant>(scene.axis.plant).max_rate_rad_s = 1.04;  // 1.047 are commanded
+    const ServoIdentification servo = identify_servo(log_of(scene, seed));
+    EXPECT_EQ(servo.num_command_times, 0u) << seed;
+    ASSERT_EQ(std::ranges::count(servo.fit.freed, ServoFlaw::rate_limit), 1) << seed;
+    EXPECT_NEAR(servo.fit.flaws.max_rate_rad_s, 1.04, 5.0 * servo.fit.flaw_sigma[ServoFlaw::rate_limit]) << seed;
+    EXPECT_LT(error_in_sigma(servo.fit, scene, ServoParam::gain), 5.0) << seed;
+  }
+}
+
 TEST(ServoLogTimes, CommandsAtRowsStayThere) {
   const auto draws = static_cast<std::uint64_t>(testing::trials(3));
   for (const bool is_rate_plant : {false, true}) {

@@ -168,7 +168,7 @@ assumed[].name      text   what was taken as given
 assumed[].value     any    as it was given
 assumed[].sigma     1      counted in the answer's; 0: exact; null: not given
 assumed[].ordinary  1      the error supposed where there is no σ
-assumed[].moves     1      how far the answer moves by it, in σ
+assumed[].moves     1      how far the answer moves by it, in σ; null: `moved` says it
 assumed[].moved     text   the value that moves most
 assumed[].moved_by  1      how far, in its unit
 covariance.names[]  text   the parameters

@@ -97,11 +97,17 @@ TEST(PlainPage, SaysWhatWasTakenAsGivenAndTheIdealSigma) {
                           {"moves", 0.25},
                           {"moved", "theta_x_rad"},
                           {"moved_by", 1e-4}},
+                         {{"name", "rig.not_tested"},
+                          {"value", nullptr},
+                          {"sigma", 0},
+                          {"moves", nullptr},
+                          {"moved", "2 px of head1.camera.cx moves the target by 4.2 % of its range"}},
                          {{"name", evil}, {"value", nullptr}, {"sigma", 0}, {"moves", 0}, {"moved", nullptr}}};
   const std::string page = report::plain_page(document.dump());
   for (const char* part : {"± 1.3", "± 0.63", "± 0.0012", "± 0.0018", "Taken as given", "square_m", "not given",
                            "0.00005 more or less moves origin_m z by 12.5 of its σ", "camera.fx", "0.7",
-                           "its σ moves theta_x_rad by 0.25 of its σ", "exact"})
+                           "its σ moves theta_x_rad by 0.25 of its σ", "exact",
+                           "<td>2 px of head1.camera.cx moves the target by 4.2 % of its range</td>"})
     EXPECT_THAT(page, HasSubstr(part));
   EXPECT_THAT(page, Not(HasSubstr("<img src=x")));
   EXPECT_THAT(report::plain_page(sample().dump()), Not(HasSubstr("Taken as given")));

@@ -75,10 +75,11 @@ std::string assumed_markup(const Json& assumed) {
     const std::string moved = text_of(member(each, "moved"));
     const std::string error =
         sigma.is_null() ? number_text(number_of(member(each, "ordinary"))) + " more or less" : "its σ";
+    const Json& by = member(each, "moves");  // null: `moved` says it in a sentence
     rows += "<tr><th>" + escaped(text_of(member(each, "name"))) + "</th>" + cell(value) + "<td>" + known + "</td><td>" +
-            (moved.empty() ? ""
-                           : escaped(error + " moves " + moved + " by ") +
-                                 number_text(number_of(member(each, "moves"))) + " of its σ") +
+            (moved.empty()  ? ""
+             : by.is_null() ? escaped(moved)
+                            : escaped(error + " moves " + moved + " by ") + number_text(number_of(by)) + " of its σ") +
             "</td></tr>";
   }
   return "<h2>Taken as given</h2><table><tr><th>what</th><th>value</th><th>σ</th><th>effect</th></tr>" + rows +

@@ -187,7 +187,9 @@ void judge_observations(std::span<const TargetObservation> observations, std::sp
   const std::vector<TrackStep> steps = followed(sorted, heads, learning, config.progress).steps;
   report.nis_per_dof = mean_nis(steps, counted(steps, config.warm_up_s), config.tracker.gate);
   report.innovations = test_innovations(sorted, heads, steps, config);
-  report.faults = rig_faults(sorted, heads, config.tracker);
+  RigTests tests = rig_faults(sorted, heads, config.tracker);
+  report.faults = std::move(tests.faults);
+  report.power = std::move(tests.power);
 }
 
 }  // namespace

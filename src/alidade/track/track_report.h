@@ -46,6 +46,15 @@ struct RigFault {
   Eigen::VectorXd moved;  ///< The same of the head's rows in RigUncertainty.
 };
 
+/// What the observations would say of a parameter of the rig if it were off.
+struct RigPower {
+  std::string name;       ///< As of a RigFault.
+  std::size_t head = 0;   ///< Index in the rig's list of heads.
+  Eigen::VectorXd step;   ///< One unit of it, of the head's rows in RigUncertainty.
+  double largest = 0.0;   ///< Errors are smaller.
+  double z_per_unit = 0;  ///< By how much an error of one unit would raise z: 0 is never seen.
+};
+
 /// What became of all observations, and how good it is. Positions and velocities are in the rig's world.
 struct TrackReport {
   enum class Status { tracked, no_start };
@@ -71,6 +80,7 @@ struct TrackReport {
   std::vector<HeadInnovations> innovations;
   double inflation = 1.0;           ///< Every covariance was increased by this factor, from the innovations.
   std::vector<RigFault> faults;     ///< The most significant first.
+  std::vector<RigPower> power;      ///< Of each parameter that is tested.
   bool fits_without_fault = false;  ///< The first is significant, and with it corrected the observations fit.
   bool errors_are_counted = false;  ///< Those of the rig.
 };

@@ -19,7 +19,7 @@ export interface Assumed {
   value: number;
   sigma: number; // NaN: none is given; 0: exact
   ordinary: number; // where there is no σ: the error supposed
-  moves: number; // in σ of what it moves most
+  moves: number; // in σ of what it moves most; NaN: `moved` says it in a sentence
   moved: string;
   movedBy: number; // in its unit
 }

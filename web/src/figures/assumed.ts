@@ -10,7 +10,7 @@ function plain(name: string): {words: string; unit: string; factor: number} {
   const [head, ...rest] = name.split(' ');
   for (const [ending, unit, factor] of units)
     if (head!.endsWith(ending)) return {words: [head!.slice(0, -ending.length).replace(/[._]/g, ' '), ...rest].join(' '), unit, factor};
-  return {words: name.replace(/[._]/g, ' '), unit: '', factor: 1};
+  return {words: name.replace(/_|\.(?!\d)/g, ' '), unit: '', factor: 1};
 }
 
 function sigmaText(one: Assumed, unit: string, factor: number): string {
@@ -26,7 +26,7 @@ function rowOf(one: Assumed): HTMLElement {
   return el('tr', {}, el('th', {}, words), el('td', {class: 'value'}, Number.isFinite(one.value) ? `${num(factor * one.value, 5)}${unit ? ` ${unit}` : ''}` : ''),
     el('td', right, sigmaText(one, unit, factor)),
     el('td', {class: `value${isGrave ? ' state-care' : ''}`}, one.sigma === 0 || !Number.isFinite(one.moves) ? '–' : `${isGrave ? '◆ ' : ''}${num(one.moves, 2)} σ`),
-    el('td', {class: 'word'}, one.sigma === 0 ? '' : moved.words + by));
+    el('td', {class: 'word'}, one.sigma === 0 && Number.isFinite(one.moves) ? '' : moved.words + by));
 }
 
 function conclusion(doc: Doc): string {

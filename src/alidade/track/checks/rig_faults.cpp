@@ -159,8 +159,8 @@ struct AllTested {
 
 }  // namespace
 
-std::vector<RigFault> rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                                 const TrackerConfig& config) {
+RigTests rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                    const TrackerConfig& config) {
   constexpr std::size_t min_observations = 16;
   // A wrong rig makes a target seem more manoeuvring than any is.
   constexpr double max_m_s2 = 3.0, freely = 10.0, min_free_m_s2 = 10.0, unobservable = 1e-7;
@@ -177,19 +177,23 @@ std::vector<RigFault> rig_faults(std::span<const TargetObservation> observations
   given.information /= noise;
   given.g /= noise;
   eliminate_errors(config.errors, given);
+  RigTests tests;
   for (std::size_t k = 0; k < tested.faults.size(); ++k) {
     RigFault& fault = tested.faults[k];
+    tests.power.push_back({.name = fault.name, .head = fault.head, .step = fault.moved, .largest = fault.off});
     const Eigen::VectorXd direction = tested.large.col(static_cast<Eigen::Index>(k));
     const double weight = direction.dot(given.information * direction), pull = direction.dot(given.g);
     const double share = pull / weight;  // of what is large
     const bool is_seen = weight > unobservable * direction.cwiseAbs2().dot(given.seen) / noise;
+    if (is_seen) tests.power.back().z_per_unit = std::sqrt(weight) / fault.off;
     if (is_seen && std::abs(share) < 1.0) fault.z = std::abs(pull) / std::sqrt(weight);
     fault.off *= share;
     fault.moved *= fault.off;
   }
   std::erase_if(tested.faults, [](const RigFault& fault) { return !(fault.z > 0.0); });
   put_first(tested.faults, tested.names);
-  return tested.faults;
+  tests.faults = std::move(tested.faults);
+  return tests;
 }
 
 std::vector<RigFault> alike_per_head(const TrackReport& report) {

@@ -12,11 +12,17 @@ namespace alidade {
 /// independent, one track in 150 has such a one. Where the rig's errors are not given, only those of chance.
 [[nodiscard]] inline double max_fault_z(const TrackReport& report) { return report.errors_are_counted ? 3.5 : 5.0; }
 
+/// Of what is tested the faults, the most significant first, and the power.
+struct RigTests {
+  std::vector<RigFault> faults;
+  std::vector<RigPower> power;
+};
+
 /// Tests each parameter of each head alone: what the observations would gain if it were free beside what the rig file
-/// allows (score test: C. R. Rao, 1948), the most significant first. They are in order of capture, and linearised along
-/// one path, about which the target may go anywhere. Empty where they determine no path.
-[[nodiscard]] std::vector<RigFault> rig_faults(std::span<const TargetObservation> observations,
-                                               std::span<const RigHead> heads, const TrackerConfig& config);
+/// allows (score test: C. R. Rao, 1948). They are in order of capture, and linearised along one path, about which the
+/// target may go anywhere. Empty where they determine no path.
+[[nodiscard]] RigTests rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                  const TrackerConfig& config);
 
 /// The first fault, if it is significant, and of each head the first of those that explain the observations as well.
 [[nodiscard]] std::vector<RigFault> alike_per_head(const TrackReport& report);

@@ -67,7 +67,7 @@ TrackReport tested(const Rig& rig, const std::vector<TargetObservation>& observa
   config.sigma_a_m_s2 = sigma_a_m_s2;
   TrackReport report;
   report.errors_are_counted = true;
-  report.faults = rig_faults(observations, rig.heads, config);
+  report.faults = rig_faults(observations, rig.heads, config).faults;
   return report;
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/track/checks/unseen_errors.h"
+
 namespace alidade {
 namespace {
 
@@ -32,17 +34,7 @@ Median median_of_steps(std::span<const TargetObservation> observations, std::spa
   const auto middle = by_range.begin() + static_cast<std::ptrdiff_t>(by_range.size() / 2);
   std::ranges::nth_element(by_range, middle);
   median.step = &report.steps[middle->second];
-  for (std::size_t h = 0; h < heads.size(); ++h) {
-    double min_s = 1.0;
-    const TargetObservation* nearest = nullptr;
-    for (const TargetObservation& observation : observations) {
-      const double apart_s = std::abs(observation.t_capture_s - median.step->t_s);
-      if (observation.head != h || !(apart_s < min_s)) continue;
-      min_s = apart_s;
-      nearest = &observation;
-    }
-    if (nearest != nullptr) median.readings.push_back({h, nearest->pan_tilt_rad});
-  }
+  median.readings = readings_at(observations, heads.size(), median.step->t_s);
   return median;
 }
 
@@ -163,7 +155,35 @@ double moved_by_motion(std::span<const TargetObservation> observations, std::spa
   return num > 0.0 ? std::sqrt(sum / num) : 0.0;
 }
 
+/// One row for what of the rig no test sees; what it stands for has its own σ, so that it has no say in the verdict.
+std::optional<Assumption> not_tested(std::span<const TargetObservation> observations, const Rig& rig,
+                                     const FollowConfig& config, const TrackReport& report) {
+  const UnseenErrors unseen = unseen_errors(observations, rig.heads, config.tracker, rig.cov.size() > 0, report);
+  if (unseen.params.empty() || unseen.worst.empty()) return std::nullopt;
+  Assumption row{.name = "rig.not_tested", .value = std::nan(""), .moved = unseen_text(unseen)};
+  row.sigma = unseen.sigma_share;
+  row.ordinary = unseen.worst.front().share;
+  row.moves = unseen.sigma_in_sigma.value_or(0.0) > 0.0 ? *unseen.sigma_in_sigma : std::nan("");
+  return row;
+}
+
 }  // namespace
+
+std::vector<HeadReading> readings_at(std::span<const TargetObservation> observations, std::size_t num_heads,
+                                     double t_s) {
+  std::vector<double> nearest_s(num_heads, 1.0);
+  std::vector<const TargetObservation*> nearest(num_heads, nullptr);
+  for (const TargetObservation& observation : observations) {
+    const double apart_s = std::abs(observation.t_capture_s - t_s);
+    if (observation.head >= num_heads || !(apart_s < nearest_s[observation.head])) continue;
+    nearest_s[observation.head] = apart_s;
+    nearest[observation.head] = &observation;
+  }
+  std::vector<HeadReading> readings;
+  for (std::size_t h = 0; h < num_heads; ++h)
+    if (nearest[h] != nullptr) readings.push_back({h, nearest[h]->pan_tilt_rad});
+  return readings;
+}
 
 std::vector<Eigen::MatrixXd> meeting_sensitivity(std::span<const RigHead> heads, std::span<const HeadReading> readings,
                                                  const Eigen::Vector3d& point_in_world,
@@ -214,6 +234,7 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
   if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations say
   lister.assumed.push_back(std::move(motion));
+  if (auto row = not_tested(observations, rig, config, report)) lister.assumed.push_back(std::move(*row));
   return std::move(lister.assumed);
 }
 

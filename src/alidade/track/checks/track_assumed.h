@@ -15,23 +15,30 @@ struct TrackGiven {
   double sigma_clock_s = 0.0;  ///< 0: not given.
 };
 
-/// What a track takes as given: lenses, heads, encoders, clocks, noise and the model of motion. `moves`: of the target
-/// where half of it was nearer, by the heads' rays meeting elsewhere, in the σ that the track states there. A rig of
-/// one head, or a report without a track, moves nothing.
-[[nodiscard]] std::vector<Assumption> track_assumed(std::span<const TargetObservation> observations, const Rig& rig,
-                                                    const FollowConfig& config, const TrackReport& report,
-                                                    const TrackGiven& given);
-
-/// How a point triangulated by heads at these readings depends on their parameters: ∂ point / ∂ (head_param_names, lens
-/// parameters, delay of its clock) of each head, by least squares over their pixels. Empty where they do not determine
-/// it.
+/// What a head's encoders read.
 struct HeadReading {
   std::size_t head = 0;
   Eigen::Vector2d pan_tilt_rad;
 };
+
+/// Of each head what it read nearest to that time, if it did within a second.
+[[nodiscard]] std::vector<HeadReading> readings_at(std::span<const TargetObservation> observations,
+                                                   std::size_t num_heads, double t_s);
+
+/// How a point triangulated by heads at these readings depends on their parameters: ∂ point / ∂ (head_param_names, lens
+/// parameters, delay of its clock) of each head, by least squares over their pixels. Empty where they do not determine
+/// it.
 [[nodiscard]] std::vector<Eigen::MatrixXd> meeting_sensitivity(std::span<const RigHead> heads,
                                                                std::span<const HeadReading> readings,
                                                                const Eigen::Vector3d& point_in_world,
                                                                const Eigen::Vector3d& velocity_in_world);
+
+/// What a track takes as given: lenses, heads, encoders, clocks, noise and the model of motion. `moves`: of the target
+/// where half of it was nearer, by the heads' rays meeting elsewhere, in the σ that the track states there. A rig of
+/// one head, or a report without a track, moves nothing. Last in one row what of the rig is not tested, if there is
+/// any.
+[[nodiscard]] std::vector<Assumption> track_assumed(std::span<const TargetObservation> observations, const Rig& rig,
+                                                    const FollowConfig& config, const TrackReport& report,
+                                                    const TrackGiven& given);
 
 }  // namespace alidade

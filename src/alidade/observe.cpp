@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "alidade/observe/solve/solve.h"
+#include "alidade/observe/solve/solve_once.h"
 
 namespace alidade {
 namespace {
@@ -60,6 +61,11 @@ ObserveReport judged_observation(ObserveSolution solution, RotationLog log, cons
   const StatedCovariance& stated = solution.stated;
   solution.shared_errors = {stated.blocks.design_effect, stated.correlation_s, stated.block_s, stated.track_effect,
                             solution.jitter.noise_rad()};
+  if (setup.rotation != RotationKnowledge::known) {
+    const AdjustConfig adjusted = adjust_config_of(log, setup, start_camera(setup, solution.scale), solution.scale);
+    solution.sigma_angle_rad = adjusted.sigma_rotation_rad;
+    solution.sigma_rate_rad_per_s = adjusted.sigma_rate_rad_per_s;
+  }
   solution.log = std::move(log);
   return std::move(static_cast<ObserveReport&>(solution));
 }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "alidade/estimation/config_error.h"
@@ -148,6 +149,7 @@ ObserveReport observe_matches(MatchedPhotos matches, const std::vector<std::stri
   report.sigma_is_estimated = !setup.sigma_px;
   report.assumed = solved.assumed;
   report.shared_errors.design_effect = solved.design_effect;
+  report.sigma_angle_rad = std::numeric_limits<double>::infinity();
   report.motion.span_rad = solved.largest_turn_rad;
   report.matches = solved.matches;
   report.parallax = solved.parallax;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <map>
 
 #include "alidade/estimation/config_error.h"
 #include "alidade/geometry/degree.h"
@@ -12,12 +11,16 @@
 namespace alidade {
 namespace {
 
+constexpr const char* unmeasured = "moves are planned of a head or gimbal whose rotation is measured; this one was not";
+
 std::string now_fault(const ObservedNow& now) {
   if (now.width_px < 1 || now.height_px < 1) return "the size of the images must be given";
   if (!now.k_px.allFinite() || !(now.k_px.head<2>().minCoeff() > 0.0)) return "the focal lengths must be above zero";
   if (!(now.sigma_px > 0.0) || !std::isfinite(now.sigma_px)) return "σ of a pixel must be above zero";
   const bool is_covariance = now.cov_px2.allFinite() && now.cov_px2.diagonal().minCoeff() > 0.0;
   if (!is_covariance) return "the covariance of fx, fy, cx, cy must be positive definite";
+  if (!(now.frames_per_s > 0.0) || !std::isfinite(now.frames_per_s)) return "there must be frames in a second";
+  if (now.source == RotationSource::none || !std::isfinite(now.sigma_angle_rad)) return unmeasured;
   for (const Eigen::Vector2d& px : now.points_px) {
     if (!px.allFinite()) return "a point is not at finite pixels";
   }
@@ -62,7 +65,7 @@ MovePlan plan_moves(const ObservedNow& now, const MoveConfig& config, const Prog
   std::vector<std::string> faults = faults_of(fields_of(plan.config));
   if (const std::string fault = now_fault(now); !fault.empty()) faults.push_back(fault);
   if (!faults.empty()) throw ConfigError(fmt::format("{}", fmt::join(faults, "; ")));
-  const MoveLimits limits{config.rate_deg_s * degree, config.max_turn_deg * degree, config.roll};
+  const MoveLimits limits{config.rate_deg_s * degree, config.max_turn_deg * degree, config.roll, now.frames_per_s};
   plan.moves = plan_next_moves(now, limits, config.moves, progress);
   if (!plan.moves.empty()) plan.counts.given = plan.counts.used = 1;
   plan.verdict = moves_verdict(plan);
@@ -75,15 +78,25 @@ ObservedNow observed_now(const ObserveReport& report) {
   if (report.quantities.size() < 4 || !has_answer) {
     throw ConfigError("this observation was refused: " + report.verdict.to_add);
   }
+  if (report.log.source == RotationSource::none) throw ConfigError(unmeasured);
   ObservedNow now;
   now.width_px = report.width_px;
   now.height_px = report.height_px;
   now.sigma_px = report.sigma_px;
   now.cov_px2 = report.covariance.topLeftCorner<4, 4>();
   for (int i = 0; i < 4; ++i) now.k_px[i] = report.quantities[static_cast<std::size_t>(i)].value;
-  std::map<int, Eigen::Vector2d> last;
-  for (const ObserveResidual& seen : report.residuals) last[seen.point] = seen.px;
-  for (const auto& [point, px] : last) now.points_px.push_back(px);
+  for (int i = 0; i < 4; ++i) now.sigma_model_px[i] = report.quantities[static_cast<std::size_t>(i)].sigma_model;
+  now.design_effect = report.shared_errors.design_effect;
+  now.source = report.log.source;
+  now.sigma_angle_rad = report.sigma_angle_rad;
+  now.sigma_rate_rad_per_s = report.sigma_rate_rad_per_s;
+  const std::vector<RotationRow>& rows = report.log.rows;
+  const double seconds = rows.empty() ? 0.0 : rows.back().t_s - rows.front().t_s;
+  if (seconds > 0.0) now.frames_per_s = static_cast<double>(rows.size() - 1) / seconds;
+  now.assumed = report.assumed;
+  for (const ObservedQuantity& quantity : report.quantities)
+    assume_estimated(quantity.name, quantity.sigma, now.assumed);
+  now.points_px = points_at_end(report.residuals, now.frames_per_s);
   return now;
 }
 

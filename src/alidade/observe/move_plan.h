@@ -20,6 +20,13 @@ struct ObservedNow {
   Eigen::Matrix4d cov_px2 = Eigen::Matrix4d::Zero();
   std::vector<Eigen::Vector2d> points_px;  ///< Seen now.
   double sigma_px = 0.3;
+  double frames_per_s = 30.0;
+  /// σ of fx, fy, cx, cy if every pixel erred by itself and all that was given were exact; zero: as cov_px2 says.
+  Eigen::Vector4d sigma_model_px = Eigen::Vector4d::Zero();
+  double design_effect = 1.0;  ///< Variance of sums of pixels over what independent errors would leave.
+  RotationSource source = RotationSource::head;
+  double sigma_angle_rad = 0.0, sigma_rate_rad_per_s = 0.0;  ///< Of the measured rotation; 0: exact.
+  std::vector<Assumption> assumed = {};                      ///< What the moves take as given as well.
 };
 
 /// Rotate to this pan, tilt, roll (from where the camera looks now), and what will be known then if enough points stay
@@ -52,7 +59,8 @@ struct MovePlan {
 /// invalid config or camera.
 [[nodiscard]] MovePlan plan_moves(const ObservedNow& now, const MoveConfig& config = {}, const Progress& progress = {});
 
-/// What a report knows of its camera, and where the points were seen last. Throws ConfigError where it has no camera.
+/// What a report knows of its camera, and where the points were seen last. Throws ConfigError where it has no camera,
+/// or the rotation was not measured.
 [[nodiscard]] ObservedNow observed_now(const ObserveReport& report);
 
 ALIDADE_PUBLIC_END

@@ -3,16 +3,31 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/observe/solve/rotation_bundle.h"
+#include "alidade/geometry/so3.h"
+#include "alidade/observe/solve/solve.h"
 #include "alidade/pantilt/head_rotation.h"
 
 namespace alidade {
 namespace {
 
 constexpr std::size_t max_points = 50;
+
+/// The covariance (normalised) if every pixel erred by itself: with its σ, and correlations as stated.
+Eigen::Matrix4d model_covariance(const ObservedNow& now, const Eigen::Matrix4d& cov) {
+  if (!(now.sigma_model_px.minCoeff() > 0.0)) return cov;
+  const Eigen::Vector4d sigma = now.cov_px2.diagonal().cwiseSqrt();
+  const Eigen::Vector4d share = now.sigma_model_px.cwiseMin(sigma).cwiseQuotient(sigma);
+  return share.asDiagonal() * cov * share.asDiagonal();
+}
+
+Eigen::Matrix4d without_negative(const Eigen::Matrix4d& symmetric) {
+  const SymmetricEigen eigen = symmetric_eigen(symmetric);
+  return eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
+}
 
 class Planner {
  public:
@@ -26,8 +41,9 @@ class Planner {
       if (ray) bundle_.points.push_back({rotation_to(*ray), Eigen::Vector2d::Zero(), 0.0});
     }
     look_from({0.0, 0.0, 0.0});
-    const Eigen::Matrix4d cov = now.cov_px2 / (scale_.scale * scale_.scale);
-    before_ = inverse_symmetric(cov);
+    const Eigen::Matrix4d cov = now.cov_px2 / (scale_.scale * scale_.scale), model = model_covariance(now, cov);
+    before_ = inverse_symmetric(model);
+    given_before_ = without_negative(cov - model);
   }
 
   std::optional<NextMove> best_move() {
@@ -50,6 +66,7 @@ class Planner {
     if (!best) return best;
     (void)travel(best->pan_tilt_roll_rad);
     at_ = best->pan_tilt_roll_rad;
+    best->sigma_px = stated_sigma_px();
     return best;
   }
 
@@ -80,10 +97,18 @@ class Planner {
   }
 
   void look_from(const Eigen::Vector3d& pan_tilt_roll_rad) {
+    const auto index = static_cast<int>(bundle_.frames.size());
     RotationFrame frame;
     frame.cam_from_start = base_from_cam_rotation(pan_tilt_roll_rad).conjugate();
+    frame.t_s = index / limits_.frames_per_s;
+    if (index > 0) {
+      const Eigen::Quaterniond before = bundle_.frames.back().cam_from_start;
+      frame.dt_s = 1.0 / limits_.frames_per_s;
+      frame.rate_rad_per_s = -log_so3(frame.cam_from_start * before.conjugate()) / frame.dt_s;
+    }
+    angles_rad_.resize(bundle_.frames.size());  // of a candidate that was not taken
+    angles_rad_.push_back(pan_tilt_roll_rad);
     const RotationView view(bundle_.camera, frame);
-    const auto index = static_cast<int>(bundle_.frames.size());
     for (std::size_t i = 0; i < bundle_.points.size(); ++i) {
       const auto q = view.project(bundle_.points[i]);
       if (!q) continue;
@@ -95,25 +120,96 @@ class Planner {
     bundle_.frames.push_back(frame);
   }
 
-  [[nodiscard]] Eigen::Vector4d variance_px2() const {
+  [[nodiscard]] BundleSolution solution() const {
     RotationBundleConfig config;
-    config.sigma_px = now_.sigma_px / scale_.scale;
+    config.nuisances.rotation = now_.sigma_angle_rad > 0.0 || now_.sigma_rate_rad_per_s > 0.0;
+    config.sigma_rotation_rad = now_.sigma_angle_rad;
+    config.sigma_rate_rad_per_s = now_.sigma_rate_rad_per_s;
+    config.sigma_px = sigma_px();
     config.huber = 0.0;
     config.max_iterations = 0;
-    const BundleSolution solution = solve_rotation_bundle(bundle_, CommonPrior(bundle_.camera), config);
-    const Eigen::Matrix4d all = solution.information + before_;
+    BundleSolution solution = solve_rotation_bundle(bundle_, CommonPrior(bundle_.camera), config);
+    solution.prior_information = before_;
+    solution.prior_gradient = Eigen::Vector4d::Zero();
+    return solution;
+  }
+
+  /// Normalised.
+  [[nodiscard]] double sigma_px() const {
+    return now_.sigma_px * std::sqrt(std::max(1.0, now_.design_effect)) / scale_.scale;
+  }
+
+  /// As long as every pixel errs by itself, and all that is given is exact.
+  [[nodiscard]] Eigen::Vector4d variance_px2() const {
+    const Eigen::Matrix4d all = solution().information + before_;
     return inverse_symmetric(all).diagonal() * (scale_.scale * scale_.scale);
+  }
+
+  /// With what is given: how far its errors move the estimate during the moves, and how far they have moved it in the
+  /// log before, by whatever that still counts for. They are the same errors, so at worst both add up.
+  [[nodiscard]] Eigen::Vector4d stated_sigma_px() const {
+    Adjustment moves{.has_value = true, .solution = solution(), .bundle = bundle_, .sigma_px = sigma_px()};
+    const Eigen::Matrix4d model = inverse_symmetric(Eigen::Matrix4d(moves.solution.information + before_));
+    CommonMatrix given = Eigen::Matrix4d::Zero();
+    add_assumed(now_.assumed, cause_scores(log(), moves, {.height = now_.height_px / scale_.scale}), given);
+    const Eigen::Matrix4d share = model * before_, earlier = share * given_before_ * share.transpose();
+    const Eigen::Vector4d moved = earlier.diagonal().cwiseSqrt() + given.diagonal().head<4>().cwiseSqrt();
+    const Eigen::Vector4d sigma = (model.diagonal() + moved.cwiseAbs2()).cwiseSqrt() * scale_.scale;
+    return sigma.cwiseMin(now_.cov_px2.diagonal().cwiseSqrt());
+  }
+
+  /// The rotations of the frames as they will be measured.
+  [[nodiscard]] RotationLog log() const {
+    RotationLog log{.source = now_.source, .has_roll_rate = true};
+    for (std::size_t k = 0; k < bundle_.frames.size(); ++k) {
+      const RotationFrame& frame = bundle_.frames[k];
+      log.rows.push_back({.t_s = frame.t_s,
+                          .rate_rad_per_s = frame.rate_rad_per_s,
+                          .pan_tilt_roll_rad = angles_rad_[k],
+                          .base_from_cam = frame.cam_from_start.conjugate()});
+    }
+    return log;
   }
 
   const ObservedNow& now_;
   const MoveLimits& limits_;
   PixelScale scale_;
   RotationBundle bundle_;
-  Eigen::Matrix4d before_;
+  std::vector<Eigen::Vector3d> angles_rad_;                 ///< Pan, tilt, roll of each frame.
+  Eigen::Matrix4d before_ = Eigen::Matrix4d::Zero();        ///< Information of the log before, by its single pixels.
+  Eigen::Matrix4d given_before_ = Eigen::Matrix4d::Zero();  ///< What its σ has beside that.
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace
+
+std::vector<Eigen::Vector2d> points_at_end(std::span<const ObserveResidual> seen, double frames_per_s) {
+  constexpr double now_s = 0.25;
+  constexpr std::size_t enough = 4;
+  int end = 0;
+  for (const ObserveResidual& each : seen) end = std::max(end, each.row);
+  std::map<int, ObserveResidual> last;
+  for (const ObserveResidual& each : seen) {
+    const auto at = last.find(each.point);
+    if (at == last.end() || at->second.row <= each.row) last[each.point] = each;
+  }
+  std::vector<Eigen::Vector2d> all, now;
+  for (const auto& [point, each] : last) {
+    all.push_back(each.px);
+    if (end - each.row <= now_s * frames_per_s) now.push_back(each.px);
+  }
+  return now.size() < enough ? all : now;
+}
+
+void assume_estimated(const std::string& quantity, double sigma, std::vector<Assumption>& assumed) {
+  static const std::map<std::string, std::string> names{{"k1", "k1"},
+                                                        {"delay_s", "delay"},
+                                                        {"mount_x_rad", "mount about x"},
+                                                        {"mount_y_rad", "mount about y"},
+                                                        {"mount_z_rad", "mount about z"}};
+  const auto name = names.find(quantity);
+  if (name != names.end()) assumed.push_back({.name = name->second, .sigma = sigma});
+}
 
 std::vector<NextMove> plan_next_moves(const ObservedNow& now, const MoveLimits& limits, int num_moves,
                                       const Progress& progress) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+#include <string>
 #include <vector>
 
 #include "alidade/estimation/progress.h"
@@ -19,5 +21,12 @@ struct MoveLimits {
 /// bearings unknown. Empty: no point is seen, or none stays in the image.
 [[nodiscard]] std::vector<NextMove> plan_next_moves(const ObservedNow& now, const MoveLimits& limits, int num_moves,
                                                     const Progress& progress = {});
+
+/// Where the points are at the end of the log: seen within its last quarter of a second, or, where those are fewer than
+/// four, where each was seen last.
+[[nodiscard]] std::vector<Eigen::Vector2d> points_at_end(std::span<const ObserveResidual> seen, double frames_per_s);
+
+/// What is estimated beside fx, fy, cx, cy is to the plan assumed with its σ: no value, or a σ of null, is none.
+void assume_estimated(const std::string& quantity, double sigma, std::vector<Assumption>& assumed);
 
 }  // namespace alidade

@@ -1,7 +1,10 @@
 #include "alidade/observe/next_move.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "alidade/estimation/config_error.h"
+#include "alidade/observe.h"
 #include "alidade/observe/solve/rotation_bundle.h"
 #include "alidade/simulate/rotation.h"
 
@@ -59,6 +62,95 @@ TEST(NextMove, ReachesThePapersAccuracyInAThirdOfTheTime) {
   }
   // Over the sets together; of single sets of four points two in three are as good.
   EXPECT_LE(planned_squares, paper_squares);
+}
+
+/// A head that sways for a while, and then goes where it is told.
+class SwaysThenMoves {
+ public:
+  static constexpr double sway_s = 6.0;
+
+  explicit SwaysThenMoves(std::uint64_t seed) : seed_(seed) {
+    how_ = {.source = RotationSource::head, .rate_hz = 10.0, .duration_s = sway_s, .clip_to_image = true};
+    // Some come into the image as it moves.
+    scene_.start_px = draw_points(1560, 1164, 30, seed);
+    for (Eigen::Vector2d& px : scene_.start_px) px -= Eigen::Vector2d(390.0, 291.0);
+  }
+
+  void go(const NextMove& move) {
+    const Eigen::Vector3d from = legs_.empty() ? at_end_of_sway() : legs_.back().to;
+    legs_.push_back({how_.duration_s, from, at_end_of_sway() + move.pan_tilt_roll_rad});
+    how_.duration_s += move.duration_s;
+  }
+
+  ObserveReport observed() {
+    scene_.motion = [this](double t_s) { return angles(t_s); };
+    RotationLog log = simulate_rotation(scene_, how_, seed_);
+    log.sigma_scale = 0.002;
+    log.truth.clear();
+    return observe(std::move(log), {.width_px = 780, .height_px = 582});
+  }
+
+ private:
+  struct Leg {
+    double from_s;
+    Eigen::Vector3d from, to;
+  };
+
+  static Eigen::Vector3d at_end_of_sway() { return paper_pan_tilt(sway_s, 0.0); }
+
+  [[nodiscard]] Eigen::Vector3d angles(double t_s) const {
+    if (t_s < sway_s || legs_.empty()) return paper_pan_tilt(t_s, 0.0);
+    for (std::size_t i = 0; i < legs_.size(); ++i) {
+      const double until_s = i + 1 < legs_.size() ? legs_[i + 1].from_s : how_.duration_s;
+      const double share = (t_s - legs_[i].from_s) / (until_s - legs_[i].from_s);
+      if (share <= 1.0) return legs_[i].from + share * (legs_[i].to - legs_[i].from);
+    }
+    return legs_.back().to;
+  }
+
+  std::uint64_t seed_;
+  RotationScene scene_;
+  RotationLogConfig how_;
+  std::vector<Leg> legs_;
+};
+
+TEST(NextMove, PromisesWhatIsStatedAfterwards) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SwaysThenMoves head(seed);
+    const ObserveReport before = head.observed();
+    ASSERT_TRUE(before.verdict.ok()) << before.verdict.sentence;
+    const MovePlan plan = plan_moves(observed_now(before), {.moves = 2});
+    for (const NextMove& move : plan.moves) head.go(move);
+    const ObserveReport after = head.observed();
+    ASSERT_TRUE(after.verdict.ok()) << after.verdict.sentence;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const ObservedQuantity &is = after.quantities[i], &was = before.quantities[i];
+      const double promised = plan.moves.back().sigma_px[static_cast<Eigen::Index>(i)];
+      const auto who = fmt::format("{} of seed {}, {} before", is.name, seed, was.sigma);
+      EXPECT_GT(promised, 0.5 * is.sigma) << who;
+      // Of the principal point it may be far less: errors before and during the moves do not add up, as is supposed.
+      if (i < 2) EXPECT_LT(promised, 2.0 * is.sigma) << who;
+    }
+  }
+}
+
+TEST(NextMove, PromisesNothingOfRotationsThatAreNotMeasured) {
+  ObservedNow now{780, 582, {710.0, 700.0, 390.0, 290.0}, Eigen::Vector4d::Ones().asDiagonal(), {}, 0.3};
+  now.points_px = draw_points(780, 582, 4, 1);
+  now.source = RotationSource::none;
+  EXPECT_THROW((void)plan_moves(now), ConfigError);
+}
+
+TEST(NextMove, PointsAreWhereTheyAreAtTheEnd) {
+  std::vector<ObserveResidual> seen;
+  for (int row = 0; row < 40; ++row)
+    for (int point = 0; point < 6; ++point)
+      if (row < 10 || point < 5) seen.push_back({.row = row, .point = point, .px = {10.0 * row, point}});
+  EXPECT_EQ(points_at_end(seen, 30.0).size(), 5u);
+  EXPECT_EQ(points_at_end(seen, 30.0).front(), Eigen::Vector2d(390.0, 0.0));
+  // Of so few all are better than none.
+  std::erase_if(seen, [](const ObserveResidual& each) { return each.point >= 2 && each.row >= 10; });
+  EXPECT_EQ(points_at_end(seen, 30.0).size(), 6u);
 }
 
 TEST(NextMove, AsksForATiltWhereAPanHasSaidAllItCan) {

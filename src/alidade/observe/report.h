@@ -126,6 +126,8 @@ struct ObserveReport {
   std::vector<ObserveResidual> residuals;
   std::vector<TestedCause> tested_causes;
   SharedErrors shared_errors;
+  /// How the rotation of each row was taken: σ of measured angles, or of rates. 0: exact; infinite: not measured.
+  double sigma_angle_rad = 0.0, sigma_rate_rad_per_s = 0.0;
 
   std::vector<RotatedPhoto> photos;  ///< One per photo; empty of a log. This and what follows is of photos.
   std::vector<std::string> photo_names;

@@ -21,6 +21,12 @@ enum class RotationSource {
   attitude,  ///< base_from_cam as a quaternion.
 };
 
+/// The word of it in files.
+[[nodiscard]] inline const char* source_name(RotationSource source) {
+  constexpr std::array names{"none", "rate", "head", "attitude"};
+  return names[static_cast<std::size_t>(source)];
+}
+
 inline constexpr double not_seen = std::numeric_limits<double>::quiet_NaN();
 
 /// One instant of a rotating camera: its rotation, and where it saw static points. What was not measured

@@ -36,6 +36,10 @@ photos[].
   turn_rad    rad    rotation from the first photo
   zoom        1      focal length over that of the first
   sigma_zoom  1      σ
+rotation.
+  source                text   how it was measured: rate, head, attitude or none
+  sigma_angle_rad       rad    σ of measured angles as taken; 0: exact, null: not measured
+  sigma_rate_rad_per_s  rad/s  σ of measured rates as taken
 shared_errors.
   design_effect  1  how much less the rows determine than if each erred by itself
   correlation_s  s  how long errors last

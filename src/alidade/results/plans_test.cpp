@@ -7,10 +7,15 @@
 
 #include "alidade/calibrate.h"
 #include "alidade/files/files.h"
+#include "alidade/observe.h"
+#include "alidade/results/observation_result.h"
+#include "alidade/results/observe_outcome.h"
 #include "alidade/results/photos_outcome.h"
 #include "alidade/results/result_board.h"
 #include "alidade/results/shots_outcome.h"
+#include "alidade/simulate/rotation.h"
 #include "alidade/testing/calibration_sample.h"
+#include "alidade/testing/temporary_folder.h"
 
 // What to measure next, from values; and an answer to every misuse.
 
@@ -35,6 +40,49 @@ TEST(Plans, PhotosAfterACalibration) {
   unknown.camera.cov.resize(0, 0);
   EXPECT_EQ(plan_photos(unknown).verdict.exit_code, ExitCode::undetermined);
   EXPECT_THROW((void)calibrated_now(Calibration{}), ConfigError);
+}
+
+/// A head without a word about how exact it is.
+RotationLog head_log() {
+  RotationScene scene;
+  scene.start_px = draw_points(780, 582, 8, 1);
+  scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
+  RotationLog log = simulate_rotation(scene, {.source = RotationSource::head, .rate_hz = 10.0}, 1);
+  log.truth.clear();
+  log.sigma_scale.reset();
+  return log;
+}
+
+TEST(Plans, AnObservationIsReadAsItWasWritten) {
+  ObserveConfig config{.estimate = {"mount"}, .width_px = 780, .height_px = 582};
+  config.rotation = RotationKnowledge::noisy;
+  config.sigma_angle_rad = 3e-4;
+  const ObserveReport report = observe(head_log(), config);
+  ASSERT_TRUE(report.verdict.ok()) << report.verdict.sentence;
+  const testing::TemporaryFolder folder;
+  const auto file = folder.path() / "result.json";
+  const auto read_back = [&](const ObserveReport& written) {
+    write_file(file, result_text(outcome_of(written).document));
+    return read_observation(file);
+  };
+  const ObservedNow now = observed_now(report), read = read_back(report);
+  EXPECT_EQ(read.source, RotationSource::head);
+  EXPECT_NEAR(read.frames_per_s, 10.0, 0.01);
+  EXPECT_EQ(read.sigma_angle_rad, 3e-4);
+  EXPECT_EQ(read.points_px.size(), now.points_px.size());
+  ASSERT_EQ(plan_moves(read).moves.size(), plan_moves(now).moves.size());
+  for (std::size_t i = 0; i < 3; ++i) {
+    const NextMove a = plan_moves(now).moves[i], b = plan_moves(read).moves[i];
+    EXPECT_EQ(a.pan_tilt_roll_rad, b.pan_tilt_roll_rad);
+    EXPECT_LT((a.sigma_px - b.sigma_px).norm(), 0.01 * a.sigma_px.norm());  // pixels are written with two decimals
+  }
+  config.rotation = RotationKnowledge::free;
+  config.sigma_angle_rad.reset();
+  config.estimate.clear();
+  const ObserveReport free = observe(head_log(), config);
+  ASSERT_FALSE(free.quantities.empty()) << free.verdict.sentence;
+  EXPECT_THROW((void)read_back(free), InputError);
+  EXPECT_THROW((void)observed_now(free), ConfigError);
 }
 
 TEST(Plans, AnswerWhatCannotBe) {

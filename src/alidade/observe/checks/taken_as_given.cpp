@@ -119,6 +119,11 @@ void count_ordinary(const CauseScore& cause, double ordinary, CommonMatrix& cov)
   cov.topLeftCorner(n, n) += scatter;
 }
 
+void count_given(const CauseMember& member, double sigma, CommonMatrix& cov) {
+  const auto n = member.moves.size();
+  if (n <= cov.rows()) cov.topLeftCorner(n, n) += sigma * sigma * member.moves * member.moves.transpose();
+}
+
 /// What the residuals ask for, but not so that it is freed: the answer may be off by as much.
 void count_asked(const ObserveSolution& report, CommonMatrix& cov) {
   constexpr double hardly = 3.0;
@@ -176,10 +181,7 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
       if (is_counted) assumption.sigma = ordinary;
       if (!sigma) assumption.ordinary = member.sigma > 0.0 ? std::min(ordinary, member.sigma) : ordinary;
       const double error = sigma ? *sigma : assumption.ordinary;
-      if (sigma && member.moves.size() <= cov.rows()) {
-        const auto n = member.moves.size();
-        cov.topLeftCorner(n, n) += error * error * member.moves * member.moves.transpose();
-      }
+      if (sigma) count_given(member, error, cov);
       effects.push_back({assumed.size(), error * member.moves.head<4>()});
       assumed.push_back(assumption);
     }
@@ -191,6 +193,27 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
   }
   add_fixed_centre(config, report, stated, assumed);
   return assumed;
+}
+
+void add_assumed(const std::vector<Assumption>& assumed, const std::vector<CauseScore>& causes, CommonMatrix& cov) {
+  const auto sigma_of = [&](const CauseScore& cause, const CauseMember& member) {
+    const auto found = std::ranges::find(assumed, full_name(cause.name, member), &Assumption::name);
+    return found == assumed.end() ? 0.0 : found->sigma.value_or(0.0);
+  };
+  for (const Given& given : givens()) {
+    const auto cause = std::ranges::find(causes, given.cause, &CauseScore::name);
+    if (cause == causes.end() || cause->members.empty()) continue;
+    if (given.is_counted) {
+      const double sigma = sigma_of(*cause, cause->members.front());
+      if (sigma > 0.0) count_ordinary(*cause, sigma, cov);
+      continue;
+    }
+    for (std::size_t i = first_member(cause->name); i < end_member(*cause); ++i) {
+      const CauseMember& member = cause->members[i];
+      const double sigma = sigma_of(*cause, member);
+      if (sigma > 0.0) count_given(member, std::max(sigma, given.least), cov);
+    }
+  }
 }
 
 }  // namespace alidade

@@ -99,6 +99,9 @@ struct Misread {
 [[nodiscard]] std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetup& config,
                                                      const ObserveSolution& report, CommonMatrix& cov);
 
+/// Adds to `cov` (normalised) what the errors do that are assumed with a σ above zero, by these scores of their causes.
+void add_assumed(const std::vector<Assumption>& assumed, const std::vector<CauseScore>& causes, CommonMatrix& cov);
+
 /// Checks of the verdict on the reference's residuals: indicated causes, shared errors, whether the noise is that of a
 /// tracker, whether points are static.
 [[nodiscard]] std::vector<Check> residual_checks(const ObserveSolution& report);

@@ -191,6 +191,15 @@ void fill_errors(const ObserveReport& report, ResultDocument& document) {
   document.estimate["causes"] = std::move(causes);
 }
 
+/// How the rotation was measured; σ of angles null: it was not.
+JsonValue rotation_value(const ObserveReport& report) {
+  JsonValue rotation = JsonValue::object();
+  rotation["source"] = source_name(report.log.source);
+  rotation["sigma_angle_rad"] = report.sigma_angle_rad;
+  rotation["sigma_rate_rad_per_s"] = report.sigma_rate_rad_per_s;
+  return rotation;
+}
+
 JsonValue events_list(const ObserveReport& report) {
   JsonValue events = JsonValue::list();
   for (const ObserveNote& note : report.events) {
@@ -279,6 +288,7 @@ void fill_observation(const ObserveReport& report, ResultDocument& document) {
   if (report.status == ObserveReport::Status::ok) {
     fill_values(report, document);
     fill_errors(report, document);
+    document.estimate["rotation"] = rotation_value(report);
     if (!log.rows.empty()) fill_reference(report, document.estimate["bound"]);
   }
   document.estimate["events"] = events_list(report);

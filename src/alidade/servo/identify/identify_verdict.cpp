@@ -31,6 +31,23 @@ std::string command_times_text(const ServoIdentification& identified) {
          text_of(1e3 * identified.sigma_command_s, 2) + " ms (σ) of the latency";
 }
 
+/// Whether blocks of rows agree on what the servo does. What was before the log is seen in its first rows alone: one
+/// block, whose own scatter says nothing of others.
+Check blocks_agree(const ServoIdentification& identified) {
+  const ServoFit& fit = identified.fit;
+  ClusterCovariance clusters = identified.clusters;
+  std::vector<Eigen::Index> before{ServoParam::start};
+  if (fit.kind == ServoKind::rate) before.push_back(ServoParam::zero);  // to it adds what the rate at the start went on
+  for (std::size_t i = 0; i < fit.freed.size(); ++i)
+    if (fit.freed[i] == ServoFlaw::earlier_command) before.push_back(num_servo_params + static_cast<Eigen::Index>(i));
+  for (const Eigen::Index place : before)
+    if (clusters.inflation.size() > place) clusters.inflation[place] = 1.0;
+  const std::string shared = identified.correlated_rows > 1
+                                 ? std::to_string(identified.correlated_rows) + " rows in a row share an error"
+                                 : "not from row to row: a few places of the log are off by more than noise";
+  return clusters_agree(clusters, "block", shared, "response");
+}
+
 void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const double correlation = identified.lag_one_correlation, rows = static_cast<double>(reading_times(log).size());
@@ -43,15 +60,7 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
                 : "residuals have structure (correlation " + text_of(correlation) +
                       " from row to row): the servo does more than the model; σ counts that rows share errors",
        correlation, limit, "1", ""});
-  ClusterCovariance clusters = identified.clusters;
-  // What was before the log is seen in its first rows alone: one block, whose own scatter says nothing of others.
-  std::vector<Eigen::Index> before{ServoParam::start};
-  for (std::size_t i = 0; i < fit.freed.size(); ++i)
-    if (fit.freed[i] == ServoFlaw::earlier_command) before.push_back(num_servo_params + static_cast<Eigen::Index>(i));
-  for (const Eigen::Index place : before)
-    if (clusters.inflation.size() > place) clusters.inflation[place] = 1.0;
-  verdict.checks.push_back(clusters_agree(
-      clusters, "block", std::to_string(identified.correlated_rows) + " rows in a row share an error", "response"));
+  verdict.checks.push_back(blocks_agree(identified));
   const double step_s = identified.duration_s / (rows - 1.0);
   const bool is_resolved = fit.params[1] > 0.5 * step_s;
   verdict.checks.push_back({"sampling", is_resolved ? State::good : State::care,

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <set>
 
 #include "alidade/detect/image_sequence.h"
 #include "alidade/formats/beam_file.h"
@@ -21,6 +22,7 @@
 #include "cli/app/app.h"
 #include "cli/app/live.h"
 #include "cli/app/standard_input.h"
+#include "cli/app/terminal.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -246,20 +248,58 @@ ObservationsOptions reading(const LocalizeArgs& args, const Camera& camera) {
   return {args.skip_bad, args.rate_hz.value_or(0.0), camera.width_px, camera.height_px};
 }
 
+/// What there is to say of rows that a user has already read: on stderr, and to those who watch.
+class RowsVerdict {
+ public:
+  RowsVerdict(const LocalizeArgs& args, live::Server* server) : server_(server) {
+    const bool is_up_to_scale = args.target.empty() && args.map.empty() && args.start.empty();
+    if (is_up_to_scale) say(0.0, "rows are up to scale, in the first camera's frame: metres, if any, at the end");
+  }
+
+  /// Each kind of thing once: rows of a wrong lens stay off where they fit each other again.
+  void take(const Verdict& recent, const ObservationFrame& last) {
+    std::string texts;
+    const auto add = [&](const std::string& name, const std::string& text) {
+      if (said_.insert(name).second) texts += (texts.empty() ? "" : "; ") + text;
+    };
+    if (recent.checks.empty()) add("none", recent.sentence);
+    for (const Check& check : recent.checks)
+      if (check.state != State::good) add(check.name, check.text);
+    if (!texts.empty())
+      say(last.t_s, "rows to frame " + std::to_string(last.frame) + ", by the filter alone: " + texts);
+  }
+
+ private:
+  void say(double t_s, const std::string& line) const {
+    tell_person("alidade: " + line);
+    const auto t_ns = static_cast<std::int64_t>(t_s * 1e9);
+    if (server_ != nullptr)
+      server_->send("/log", t_ns,
+                    [t_ns, line] { return live::log_text(t_ns, live::LogLevel::warning, "localize", line); });
+  }
+
+  live::Server* server_;
+  std::set<std::string> said_;  ///< Names of checks.
+};
+
 /// Rows from standard input as they come, each frame answered as soon as it is complete with a row of poses.csv.
 Localization localize_input(const LocalizeArgs& args, const Camera& camera, std::span<const TimedPose> truth,
-                            Run& run) {
-  StandardInput input;  // Ctrl-C ends waiting for a row
+                            live::Server* server, Run& run) {
+  constexpr std::size_t vague = 100, judged_every = 300;  // frames; depths are while they are few
+  StandardInput input;                                    // Ctrl-C ends waiting for a row
   ObservationsStream frames(input, "-", reading(args, camera));
   Localizer localizer(camera, args.config);
   const bool shows = !run.options.json && !run.options.quiet;
   const std::string header = poses_csv({});
   if (shows) std::cout << header << std::flush;
+  RowsVerdict said(args, server);
   std::size_t count = 0;
   while (const std::optional<ObservationFrame> frame = frames.next()) {
     report_progress(run.progress, "frames", ++count, 0);
     const PathStep& step = localizer.push(*frame);
     if (shows) std::cout << poses_csv({&step, 1}).substr(header.size()) << std::flush;
+    if (count == vague) static_cast<void>(localizer.recent());
+    if (count % judged_every == 0) said.take(localizer.recent(), *frame);
   }
   report_progress(run.progress, "frames", count, 0);  // the input may have ended by Ctrl-C
   run.lap("read");
@@ -305,7 +345,7 @@ ExitCode run_localize(LocalizeArgs args, Run& run) {
     };
   }
   std::optional<SeenFrames> seen;
-  const Localization result = args.is_input()    ? localize_input(args, camera, truth, run)
+  const Localization result = args.is_input()    ? localize_input(args, camera, truth, live.server(), run)
                               : args.is_images() ? localize_images(args, camera, truth, live, seen, run)
                                                  : localize_table(args, camera, truth, live, run);
   if (live.server() != nullptr && !result.path.empty()) stream.show(*live.server(), result.path.back(), true);

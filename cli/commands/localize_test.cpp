@@ -315,6 +315,25 @@ TEST_F(LocalizeCommand, AnswersWhileRowsStillCome) {
   EXPECT_LT(std::stoi(live.err), 600);  // the header and nine frames of ten were there before the input ended
 }
 
+/// What the rows of a wrong lens are, while they come; of the right one nothing is said.
+TEST_F(LocalizeCommand, SaysOfItsRowsWhatTheFilterSees) {
+  for (const char* focal : {"1", "1.05"}) {
+    simulate({"--points", "40", "--frames", "301", "--rate", "30", "--told-f", focal});
+    const std::string line = std::string("'") + ALIDADE_EXECUTABLE + "' localize - --no-report --camera '" +
+                             path("sim/camera.yaml") + "' --out '" + path("live") + "' < '" + path("sim/sights.csv") +
+                             "' --target '" + path("sim/target.yaml") + "'";
+    const Outcome live = testing::run_program({"sh", "-c", line});
+    EXPECT_EQ(live.code, 0) << live.err;
+    const bool is_right = std::string(focal) == "1";
+    EXPECT_EQ(live.err.find("rows to frame 299, by the filter alone: ") == std::string::npos, is_right) << live.err;
+  }
+  const Outcome free = testing::run_program(
+      {"sh", "-c",
+       std::string("'") + ALIDADE_EXECUTABLE + "' localize - --no-report --quiet --camera '" + path("sim/camera.yaml") +
+           "' --out '" + path("live") + "' < '" + path("sim/sights.csv") + "'"});
+  EXPECT_THAT(free.err, ::testing::HasSubstr("rows are up to scale"));
+}
+
 TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
   simulate({"--points", "20", "--frames", "60"});
   const Csv csv = Csv::read(path("sim/sights.csv"));

@@ -36,6 +36,18 @@ void add_scale(const LocalizeConfig& config, Localization& result) {
   add_imu_scale(config, result);
 }
 
+/// A result that says no more than what was given.
+Localization described(const LocalizeConfig& config, const Camera& camera) {
+  Localization result;
+  result.camera = camera;
+  result.is_in_map = config.map.has_value();
+  result.has_target = result.is_in_map || !config.target.points.empty();
+  result.scale_known = config.map ? config.map->is_in_metres : result.has_target;
+  result.is_scale_given = config.target.is_scale_given;
+  result.sigma_px = config.filter.sigma_px;
+  return result;
+}
+
 }  // namespace
 
 /// The front ends point to config: it stays where it is.
@@ -45,6 +57,7 @@ struct Localizer::Run {
   std::optional<ObservationLocalizer> of_observations;
   std::optional<ImageLocalizer> of_images;
   std::vector<PathStep> path;
+  std::size_t num_judged = 0;  ///< Of them, by recent().
 
   [[nodiscard]] double last_t_s() const {
     return path.empty() ? std::numeric_limits<double>::quiet_NaN() : path.back().t_s;
@@ -60,7 +73,7 @@ struct Localizer::Run {
 
 Localizer::Localizer(const Camera& camera, const LocalizeConfig& config) {
   require_sense(config, camera);
-  run_ = std::make_unique<Run>(Run{known_camera(camera, config), config, {}, {}, {}});
+  run_ = std::make_unique<Run>(Run{known_camera(camera, config), config, {}, {}, {}, 0});
 }
 
 Localizer::~Localizer() = default;
@@ -96,18 +109,22 @@ const PathStep& Localizer::push(const cv::Mat& grey, long frame, double t_s) {
   return step;
 }
 
+Verdict Localizer::recent() {
+  Run& run = *run_;
+  if (run.of_images) throw ConfigError("recent() is of observations");
+  Localization recent = described(run.config, run.camera);
+  recent.path.assign(run.path.begin() + static_cast<std::ptrdiff_t>(run.num_judged), run.path.end());
+  run.num_judged = run.path.size();
+  if (run.of_observations) run.of_observations->sum_up_recent(recent);
+  return live_verdict(recent);
+}
+
 Localization Localizer::finish(std::span<const TimedPose> truth) const {
   require_sense(truth);
   const Run& run = *run_;
-  Localization result;
+  Localization result = described(run.config, run.camera);
   result.path = run.path;
-  result.camera = run.camera;
   result.truth.assign(truth.begin(), truth.end());
-  result.is_in_map = run.config.map.has_value();
-  result.has_target = result.is_in_map || !run.config.target.points.empty();
-  result.scale_known = run.config.map ? run.config.map->is_in_metres : result.has_target;
-  result.is_scale_given = run.config.target.is_scale_given;
-  result.sigma_px = run.config.filter.sigma_px;
   for (const int index : run.config.filter.lens_params)
     result.lens_params.push_back(param_names(run.camera.lens)[static_cast<std::size_t>(index)]);
   if (run.of_images)

@@ -42,6 +42,9 @@ class Localizer {
   /// The next frame: observations or images, but not both. If it throws ConfigError, the state is unchanged.
   const PathStep& push(const ObservationFrame& frame);
   const PathStep& push(const cv::Mat& grey, long frame, double t_s);
+  /// Whether the poses that push() gave since this was last asked stand, by what the filter knows: of observations, not
+  /// of images. Where the lens is not as given they are off by many times their σ, while finish() may correct that.
+  [[nodiscard]] Verdict recent();
   /// The result so far; more may follow.
   [[nodiscard]] Localization finish(std::span<const TimedPose> truth = {}) const;
 

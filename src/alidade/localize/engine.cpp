@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "alidade/localize/checks/summary.h"
 
@@ -75,6 +76,7 @@ void LocalizeEngine::fill_pose(PathStep& step) const {
 void LocalizeEngine::keep_residuals(std::span<const FeatureObservation> observations,
                                     const ObservationsReport& report) {
   residuals_.add(best(), observations, report.outcomes);
+  recent_residuals_.add(best(), observations, report.outcomes);
 }
 
 void LocalizeEngine::sum_up(const std::function<std::size_t(long id)>& num_used, Localization& result) const {
@@ -82,6 +84,14 @@ void LocalizeEngine::sum_up(const std::function<std::size_t(long id)>& num_used,
   result.given = given_.numbers();
   result.radial = residuals_.structure();
   alidade::sum_up(bank(), num_used, result);
+}
+
+void LocalizeEngine::sum_up_recent(const std::function<std::size_t(long id)>& num_used, Localization& recent) {
+  recent.num_restarts =
+      static_cast<std::size_t>(std::ranges::count(recent.path, FrameEvent::restarted, &PathStep::event));
+  recent.radial = std::exchange(recent_residuals_, RadialResiduals()).structure();
+  alidade::sum_up(bank(), num_used, recent);
+  if (bank_) recent.given = given_.take_recent(best());
 }
 
 }  // namespace alidade

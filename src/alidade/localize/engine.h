@@ -53,6 +53,8 @@ class LocalizeEngine {
 
   /// What the run has to say of its whole, from `result.path`. `num_used`: how often a point was used.
   void sum_up(const std::function<std::size_t(long id)>& num_used, Localization& result) const;
+  /// The same of `recent.path`, which has the steps since this was last asked.
+  void sum_up_recent(const std::function<std::size_t(long id)>& num_used, Localization& recent);
 
  private:
   [[nodiscard]] bool is_frame_the_targets() const;
@@ -62,7 +64,7 @@ class LocalizeEngine {
   std::optional<FilterBank> bank_;
   double t_s_ = 0.0;
   PathDoubt doubt_;
-  RadialResiduals residuals_;
+  RadialResiduals residuals_, recent_residuals_;
   GivenTally given_;
   std::size_t num_restarts_ = 0;
 };

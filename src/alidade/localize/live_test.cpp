@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "alidade/localize.h"
 #include "alidade/testing/hover.h"
@@ -104,6 +107,63 @@ TEST(Live, KnownPointsThatComeBackAreNoNews) {
   RecordProperty("nees", std::to_string(nees));
   EXPECT_GT(nees, 0.3);
   EXPECT_LT(nees, 1.0 + 2.5 * std::sqrt(2.0 / 6.0 / num_runs));
+}
+
+/// The names of the checks that were not good, three hundred frames at a time.
+std::vector<std::set<std::string>> said_live(const Camera& camera, const testing::HoverRun& film) {
+  LocalizeConfig config;
+  config.target.points = film.target;
+  config.smooths = false;
+  Localizer localizer(camera, config);
+  std::vector<std::set<std::string>> said;
+  for (std::size_t k = 0; k < film.frames.size(); ++k) {
+    localizer.push(film.frames[k]);
+    if (k + 1 == 100) static_cast<void>(localizer.recent());  // vague as depths are first
+    if ((k + 1) % 300 != 0) continue;
+    said.emplace_back();
+    for (const Check& check : localizer.recent().checks)
+      if (check.state != State::good) said.back().insert(check.name);
+  }
+  return said;
+}
+
+/// The path at the end is solved with a lens that is estimated; the rows before are by the one that was given, and 7σ
+/// off with 3 % of the focal length: whoever reads them is told while they come. Of clean rows nothing is said.
+TEST(Live, RowsByAnotherLensAreNamedWhileTheyCome) {
+  testing::Hover scene;
+  scene.num_frames = 600;
+  scene.num_others = 30;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const testing::HoverRun film = testing::hovering(scene, seed);
+    for (const std::set<std::string>& names : said_live(film.camera, film))
+      EXPECT_TRUE(names.empty()) << seed << ": " << *names.begin();
+    Camera wrong = film.camera;
+    Eigen::VectorXd values = params(wrong.lens);
+    values.head<2>() *= 1.03;
+    wrong.lens = with_params(wrong.lens, values);
+    const std::set<std::string> first = said_live(wrong, film).front();
+    EXPECT_TRUE(first.contains("camera") || first.contains("radial structure")) << seed;
+  }
+}
+
+/// Each verdict is on the frames since the last one: what was wrong before is no longer said.
+TEST(Live, AVerdictIsOnTheLastFrames) {
+  testing::Hover scene;
+  scene.num_frames = 60;
+  testing::HoverRun film = testing::hovering(scene, 1);
+  for (std::size_t k = 20; k < 30; ++k) film.frames[k].observations.clear();
+  LocalizeConfig config;
+  config.target.points = film.target;
+  Localizer localizer(film.camera, config);
+  const auto num_lost = [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) localizer.push(film.frames[k]);
+    for (const Check& check : localizer.recent().checks)
+      if (check.name == "frames lost") return check.value * static_cast<double>(to - from);
+    return -1.0;
+  };
+  EXPECT_DOUBLE_EQ(num_lost(0, 15), 0.0);
+  EXPECT_DOUBLE_EQ(num_lost(15, 35), 10.0);
+  EXPECT_DOUBLE_EQ(num_lost(35, 60), 0.0);
 }
 
 }  // namespace

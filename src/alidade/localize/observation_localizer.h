@@ -23,6 +23,8 @@ class ObservationLocalizer {
   PathStep take(const ObservationFrame& frame);
   /// `result` has the path; the rest is filled in, and the path smoothed.
   void sum_up(Localization& result) const;
+  /// Of the frames in its path, the last ones since it was last asked: what the filter says of them.
+  void sum_up_recent(Localization& recent);
   /// As they are kept for it.
   [[nodiscard]] const std::vector<ObservationFrame>& frames() const { return frames_.frames(); }
 

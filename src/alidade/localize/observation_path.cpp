@@ -60,4 +60,9 @@ void ObservationLocalizer::sum_up(Localization& result) const {
   result.is_behind = is_behind(result.path, target.points, target.seen_from_plus_z);
 }
 
+void ObservationLocalizer::sum_up_recent(Localization& recent) {
+  engine_.sum_up_recent([this](long id) { return points_.num_used(id); }, recent);
+  recent.is_behind = is_behind(recent.path, config_.target.points, config_.target.seen_from_plus_z);
+}
+
 }  // namespace alidade

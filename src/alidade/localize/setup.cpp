@@ -334,6 +334,8 @@ LocalizeConfig sized(LocalizeConfig config, std::span<const ObservationFrame> fr
     most = std::max(most, frame.observations.size());
   }
   for (const KnownPoint& point : config.target.points) ids.insert(point.id);
+  if (config.map)
+    for (const SavedPoint& point : config.map->points) ids.insert(point.id);
   constexpr std::size_t num_lens = 16, limit = 1 << 20;
   const std::size_t need = motion_dim + num_lens + 6 * ids.size() + 8;
   LocalizationFilterConfig& filter = config.filter;

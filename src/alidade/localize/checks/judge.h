@@ -10,6 +10,10 @@ namespace alidade {
 /// Whether the path stands. A path that its observations contradict is never good.
 [[nodiscard]] Verdict localize_verdict(const Localization& result);
 
+/// Whether the filter's poses of the frames in `recent` stand, before the path is solved as a whole: its path is theirs
+/// alone.
+[[nodiscard]] Verdict live_verdict(const Localization& recent);
+
 /// Why an IMU's readings have no part in the path; empty where they have.
 [[nodiscard]] std::string imu_fault_text(const ImuEstimate& imu);
 /// Checks of those that have.

@@ -357,6 +357,18 @@ std::optional<Verdict> refusal(const Localization& report) {
   return std::nullopt;
 }
 
+/// State and sentence by the checks.
+void conclude(const Localization& report, Verdict& verdict) {
+  for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);
+  const std::size_t num_frames = report.path.size();
+  verdict.sentence =
+      "localised in " + std::to_string(num_frames - report.num_lost) + " of " + std::to_string(num_frames) + " frames";
+  for (const Check& check : verdict.checks) {
+    if (check.state == State::good || (check.state != verdict.state && check.name != "scale")) continue;
+    verdict.sentence += "; " + check.text;
+  }
+}
+
 }  // namespace
 
 State state_of(double value, double care, double bad) {
@@ -367,15 +379,20 @@ Verdict localize_verdict(const Localization& report) {
   if (auto refused = refusal(report)) return *std::move(refused);
   Verdict verdict;
   add_checks(report, verdict);
-  for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);
-  const std::size_t num_frames = report.path.size();
-  verdict.sentence =
-      "localised in " + std::to_string(num_frames - report.num_lost) + " of " + std::to_string(num_frames) + " frames";
-  for (const Check& check : verdict.checks) {
-    if (check.state == State::good || (check.state != verdict.state && check.name != "scale")) continue;
-    verdict.sentence += "; " + check.text;
-  }
+  conclude(report, verdict);
   heed_assumptions(localize_assumed(report), verdict);
+  return verdict;
+}
+
+Verdict live_verdict(const Localization& recent) {
+  if (std::ranges::none_of(recent.path, &PathStep::has_pose)) return never_started(recent);
+  Verdict verdict;
+  for (const auto add : {add_innovations, add_losses, add_restarts, add_given, add_radial, add_side})
+    add(recent, verdict);
+  for (Check& check : verdict.checks)
+    if (check.name == "radial structure" && check.state != State::good)
+      check.text += ", or the filter's first map was wrong: the path at the end tells";
+  conclude(recent, verdict);
   return verdict;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "alidade/localize/path/path_system.h"
 
@@ -74,6 +75,21 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
   for (int axis = 0; axis < 3; ++axis) add("speed of the target", at_cause(speed_cause + axis), std::nullopt);
   add("readout", at_cause(readout_cause), std::nullopt);
   return all;
+}
+
+std::vector<GivenNumber> GivenTally::take_recent(const LocalizationFilter& filter) {
+  const GivenEffects& given = filter.given();
+  const Said now{given.score(), given.information(), given.score_cov()};
+  // A filter that began again has forgotten what was scored: from there on.
+  const bool goes_on = before_.score.size() == now.score.size() &&
+                       (now.information.diagonal().array() >= before_.information.diagonal().array()).all();
+  const Said since = std::exchange(before_, now);
+  if (!goes_on) return {};
+  const Eigen::MatrixXd information = now.information - since.information, score_cov = now.score_cov - since.score_cov;
+  const std::vector<Eigen::Matrix<double, 6, Eigen::Dynamic>> J_pose{filter.J_pose_given()};
+  const std::vector<Eigen::Matrix<double, 6, 6>> cov{filter.pose_covariance()};
+  return given_numbers({filter.camera(), given.lens_params(), given.cov(), now.score - since.score, information,
+                        score_cov, J_pose, cov});
 }
 
 void GivenTally::add(const LocalizationFilter& filter) {

@@ -28,8 +28,16 @@ class GivenTally {
  public:
   void add(const LocalizationFilter& filter);
   [[nodiscard]] const std::vector<GivenNumber>& numbers() const { return numbers_; }
+  /// What the observations said since this was last asked: the first ones, while depths are vague, say less of the lens
+  /// than their derivatives make them seem to.
+  [[nodiscard]] std::vector<GivenNumber> take_recent(const LocalizationFilter& filter);
 
  private:
+  struct Said {
+    Eigen::VectorXd score;
+    Eigen::MatrixXd information, score_cov;
+  };
+  Said before_;  ///< When it was last asked.
   std::vector<GivenNumber> numbers_;
 };
 

@@ -7,6 +7,7 @@
 #include "alidade/estimation/config_error.h"
 #include "alidade/localize.h"
 #include "alidade/tables/map_file.h"
+#include "alidade/testing/hover.h"
 #include "alidade/testing/long_walk.h"
 #include "alidade/testing/room_film.h"
 
@@ -94,6 +95,29 @@ TEST(SavedMap, ATableBeginsAnywhereInAMapOfNumberedPoints) {
   EXPECT_TRUE(second.is_in_map);
   EXPECT_LT(second.error.unaligned_m, first.error.unaligned_m + 0.005);
   EXPECT_TRUE(second.verdict.ok()) << second.verdict.sentence;
+}
+
+/// All of the map's points are in the filter, also those that the table does not show: at once and frame by frame.
+TEST(SavedMap, ATableThatShowsLittleOfTheMapIsAsItComes) {
+  testing::Hover scene;
+  scene.num_frames = 40;
+  scene.num_others = 70;
+  const testing::HoverRun film = testing::hovering(scene, 2);
+  LocalizeConfig with_target, in_map;
+  with_target.target.points = film.target;
+  in_map.map = as_written(localize(film.frames, film.camera, with_target).saved_map);
+  ASSERT_GT(in_map.map->points.size(), 60u);
+  std::vector<ObservationFrame> frames = film.frames;
+  for (ObservationFrame& frame : frames)
+    std::erase_if(frame.observations, [](const FeatureObservation& each) { return each.id % 6 != 0; });
+  const Localization whole = localize(frames, film.camera, in_map);
+  Localizer localizer(film.camera, in_map);
+  for (const ObservationFrame& frame : frames) localizer.push(frame);
+  const Localization coming = localizer.finish();
+  EXPECT_TRUE(whole.verdict.ok()) << whole.verdict.sentence;
+  EXPECT_EQ(whole.verdict.sentence, coming.verdict.sentence);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    EXPECT_EQ(whole.path[k].world_from_cam.translation, coming.path[k].world_from_cam.translation) << k;
 }
 
 TEST(SavedMap, WhatDoesNotGoTogetherIsRefused) {

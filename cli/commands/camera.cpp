@@ -185,7 +185,7 @@ void add_convert(App& app) {
 
 /// `alidade camera show|convert|diff|undistort`
 void add_camera(App& app) {
-  app.add_group("camera", "Camera files: show, convert, compare, undistort photos");
+  app.add_group("camera", "Camera files: show, convert, diff, undistort photos");
   add_show(app);
   add_convert(app);
   add_camera_diff(app);

@@ -51,7 +51,7 @@ MAY_INCLUDE = {
 # other folders of the tree. The library includes none of them.
 OUTSIDE = {
     "cli": (set(), {"cli/app", "cli/commands"}),  # main.cpp
-    "cli/app": ({"board", "calibrate", "description", "estimation", "files", "images", "live", "report", "results"}, {"cli/app"}),
+    "cli/app": ({"board", "calibrate", "description", "estimation", "files", "geometry", "images", "live", "report", "results"}, {"cli/app"}),
     "cli/commands": (None, {"cli/app", "cli/commands"}),
     "cli/simulate": (None, {"cli/app", "cli/commands", "cli/simulate"}),
     "cli/decoder": (set(), set()),  # programs of their own: videos; campaigns on MPI; fleets on NATS; streams of cameras

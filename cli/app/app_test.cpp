@@ -11,6 +11,7 @@
 #include <set>
 #include <thread>
 
+#include "alidade/geometry/sanitizers.h"
 #include "alidade/testing/process.h"
 #include "cli/app/option_checks.h"
 
@@ -344,9 +345,7 @@ TEST(App, ProgressIsShownOnATerminalAndWipedBeforeTheResult) {
 }
 
 TEST(App, WhatLibrariesSayOnStderrIsNotAmongOurLines) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "a sanitizer keeps stderr";
-#endif
+  if (ALIDADE_IS_SANITIZED) GTEST_SKIP() << "a sanitizer keeps stderr";
   const auto noisy = [](cli::Run&) -> ExitCode {
     std::fputs("Premature end of JPEG file\n", stderr);
     throw InputError("a.jpg: broken");

@@ -9,6 +9,8 @@
 #include <ctime>
 #include <mutex>
 
+#include "alidade/geometry/sanitizers.h"
+
 namespace alidade::cli {
 namespace {
 
@@ -44,14 +46,8 @@ extern "C" void on_patience_end(int) {
 /// from here gets the usual manner back.
 extern "C" void on_failed_write(int) {}
 
-/// True where a sanitizer reports on stderr, which must then stay open to it.
-constexpr bool is_sanitized() {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  return true;
-#else
-  return false;
-#endif
-}
+/// A sanitizer reports on stderr, which must then stay open to it.
+constexpr bool is_sanitized = ALIDADE_IS_SANITIZED != 0;
 
 }  // namespace
 
@@ -90,7 +86,7 @@ Terminal::Terminal() : state_(std::make_shared<State>()) {
   current() = state_;
   people = state_->people;
   is_on_terminal = state_->is_terminal;
-  if (is_sanitized()) return;
+  if (is_sanitized) return;
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   if (nowhere < 0) return;
   ::dup2(nowhere, STDERR_FILENO);

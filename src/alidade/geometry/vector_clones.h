@@ -1,17 +1,13 @@
 #pragma once
 
+#include "alidade/geometry/sanitizers.h"
+
 /// Marks a hot loop that is compiled twice, for any x86-64 and for AVX with FMA, and chosen when the program starts:
 /// speed without asking users for -march=native. The choice is by feature: "fma" would exclude every
 /// processor that is not Intel's. Sanitizers cannot start with such functions.
 /// For functions of an unnamed namespace: clang 14 miscalls them from other files. No constructors in them: clang
 /// forgets to make what only they call.
-#if defined(__has_feature)  // clang's way to detect sanitizers
-#define ALIDADE_HAS_FEATURE(what) __has_feature(what)
-#else
-#define ALIDADE_HAS_FEATURE(what) 0
-#endif
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && \
-    !ALIDADE_HAS_FEATURE(address_sanitizer) && !ALIDADE_HAS_FEATURE(thread_sanitizer)
+#if defined(__x86_64__) && !ALIDADE_IS_SANITIZED
 #define ALIDADE_VECTOR_CLONES __attribute__((target_clones("default", "fma")))
 #else
 #define ALIDADE_VECTOR_CLONES

@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <memory>
 
+#include "alidade/geometry/sanitizers.h"
+
 // Eigen calls malloc past operator new, so malloc itself is counted: by the sanitizers' hook where they have put theirs
 // in its place, otherwise around glibc's.
 namespace {
@@ -15,12 +17,7 @@ std::atomic<std::size_t> count{0};
 
 }  // namespace
 
-#if defined(__has_feature)  // clang's word for what g++ defines
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define ALIDADE_IS_SANITIZED
-#endif
-#endif
-#if defined(ALIDADE_IS_SANITIZED) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if ALIDADE_IS_SANITIZED
 
 extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*, std::size_t),
                                                          void (*on_free)(const volatile void*));

@@ -1,13 +1,15 @@
 #pragma once
 
+#include "alidade/geometry/sanitizers.h"
+
 namespace alidade::testing {
 
-/// Whether a time that is measured says anything of what users run: not with sanitizers, nor without optimisation.
-inline constexpr bool times_count =
-#if !defined(__OPTIMIZE__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    false;
+/// Whether a time that is measured says anything of what users run: not with sanitizers, nor in a build for debugging.
+/// Tests themselves are compiled without optimisation.
+#ifdef NDEBUG
+inline constexpr bool times_count = ALIDADE_IS_SANITIZED == 0;
 #else
-    true;
+inline constexpr bool times_count = false;
 #endif
 
 }  // namespace alidade::testing

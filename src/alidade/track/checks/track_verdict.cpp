@@ -9,6 +9,7 @@
 
 #include "alidade/track/checks/clock_shift.h"
 #include "alidade/track/checks/explanation.h"
+#include "alidade/track/checks/frozen_rows.h"
 #include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/track.h"
 
@@ -339,7 +340,8 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
   // Beside what only says how bad it is, what it may come from.
-  constexpr std::array<std::string_view, 6> names{"clocks", "mistake", "second target", "falls", "rig", "lean"};
+  constexpr std::array<std::string_view, 7> names{"frozen", "clocks", "mistake", "second target",
+                                                  "falls",  "rig",    "lean"};
   const auto cause = std::ranges::find_if(
       verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
   if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
@@ -366,6 +368,10 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   const Causes causes = causes_of(report, observations, heads, config);
   if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
   Verdict verdict;
+  const auto frozen = frozen_rows(with_shift(observations, {}), heads.size());
+  if (frozen)
+    verdict.checks.push_back(
+        check("frozen", State::care, frozen_text(*frozen, heads), static_cast<double>(frozen->num), 0.0, "rows"));
   if (causes.shift)
     verdict.checks.push_back(
         check("clocks", State::care, clock_text(*causes.shift, heads), 1e3 * causes.shift->later_s, 0.0, "ms"));
@@ -377,6 +383,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   put_likelier_first(verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
   if (!alike_per_head(report).empty()) verdict.to_add = fault_remedy(report, heads);
+  if (frozen) verdict.to_add = frozen_remedy(*frozen, heads);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   verdict.sentence = sentence_of(report, verdict);
   return verdict;

@@ -56,6 +56,8 @@ backlash_rad            rad    between drive and encoder
 second_tau_s            s      second lag, of the command
 clock_rate              1      by which a second of the angles' clock is longer than one of the commands'
 earlier_command         -      what the axis followed until the first row's command took effect, less that command
+gain_difference         1      the gain is 1 + it times the stated for commands above zero, 1 − it below
+gain_drift              1      by so much of it the gain grows over the log; the stated one is its middle's
 evidence.*              1      of each of these: 2 ln of the likelihood ratio for it
 encoder_step_rad        rad    one count
 encoder_hz              Hz     how often it is sampled, where its angle is held for several rows; 0: not seen

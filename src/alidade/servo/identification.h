@@ -50,16 +50,19 @@ struct ServoFlaws {
   double clock_rate = 0.0;    ///< Angles are read by a clock of which a second is 1 + it of the commands'.
   /// What the axis followed until the first row's command took effect, less that command: of the log, not of the axis.
   double earlier_command = 0.0;
+  double gain_difference = 0.0;  ///< The gain is 1 + it times the stated for commands above zero, 1 − it below.
+  double gain_drift = 0.0;       ///< By so much of it the gain grows over the log; the stated one is its middle's.
 };
-inline constexpr std::size_t num_servo_flaws = 7;
+inline constexpr std::size_t num_servo_flaws = 9;
 inline constexpr std::array<double ServoFlaws::*, num_servo_flaws> servo_flaws{
-    &ServoFlaws::max_rate_rad_s, &ServoFlaws::max_acceleration_rad_s2,
-    &ServoFlaws::dead_band,      &ServoFlaws::backlash_rad,
-    &ServoFlaws::second_tau_s,   &ServoFlaws::clock_rate,
-    &ServoFlaws::earlier_command};
+    &ServoFlaws::max_rate_rad_s,  &ServoFlaws::max_acceleration_rad_s2,
+    &ServoFlaws::dead_band,       &ServoFlaws::backlash_rad,
+    &ServoFlaws::second_tau_s,    &ServoFlaws::clock_rate,
+    &ServoFlaws::earlier_command, &ServoFlaws::gain_difference,
+    &ServoFlaws::gain_drift};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_names{
-    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band", "backlash_rad", "second_tau_s",
-    "clock_rate",     "earlier_command"};
+    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band",       "backlash_rad", "second_tau_s",
+    "clock_rate",     "earlier_command",         "gain_difference", "gain_drift"};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
     "a limit of its rate",
     "a limit of its acceleration",
@@ -67,9 +70,18 @@ inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
     "backlash",
     "a second lag",
     "a drift between the clocks of commands and angles",
-    "another command before the first row's"};
-inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{
-    "rad/s", "rad/s^2", "units of command", "rad", "s", "s/s", "units of command"};
+    "another command before the first row's",
+    "a gain that differs by the command's sign",
+    "a gain that drifts"};
+inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/s",
+                                                                           "rad/s^2",
+                                                                           "units of command",
+                                                                           "rad",
+                                                                           "s",
+                                                                           "s/s",
+                                                                           "units of command",
+                                                                           "of the gain",
+                                                                           "of the gain over the log"};
 
 struct ServoFit {
   ServoKind kind = ServoKind::angle;

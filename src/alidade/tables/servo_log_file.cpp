@@ -56,6 +56,10 @@ std::string servo_plant_text(const ServoFit& fit) {
     const bool is_of_log =
         servo_flaws[flaw] == &ServoFlaws::clock_rate || servo_flaws[flaw] == &ServoFlaws::earlier_command;
     if (is_of_log) continue;  // not of the axis
+    if (servo_flaws[flaw] == &ServoFlaws::gain_difference || servo_flaws[flaw] == &ServoFlaws::gain_drift) {
+      flaw_sigmas += fmt::format(", {} {:.3g} (no plant has it)", name, size);
+      continue;
+    }
     const bool is_rad = name.find("rad") != std::string::npos;
     std::string key = name;
     if (const auto at = key.find("rad"); is_rad) key.replace(at, 3, "deg");

@@ -81,18 +81,30 @@ struct Walk {
 /// Gain, zero and start that fit best at a time constant and latency, and what is left.
 struct LinearFit {
   ServoParams params = ServoParams::Zero();
-  double sum2 = 0.0;
+  double difference = 0.0;  ///< Of the gain, by the command's sign.
+  double sum2 = std::numeric_limits<double>::infinity();
 };
+
+/// The response to commands of one sign: by it a gain that differs by the sign changes the response.
+Eigen::VectorXd rectified_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
+  std::vector<ServoSample> rows(log.begin(), log.end());
+  for (ServoSample& row : rows) row.command = std::abs(row.command);
+  return servo_response(rows, kind, params).J.col(ServoParam::gain);
+}
+
 LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s,
-                     const Eigen::VectorXd& readings) {
+                     const Eigen::VectorXd& readings, bool by_sign) {
   ServoParams params;
   params << 1.0, tau_s, latency_s, 0.0, 0.0;
   const ServoResponse response = servo_response(log, kind, params);
-  Eigen::Matrix<double, Eigen::Dynamic, 3> A(readings.size(), 3);  // the response is linear in these three
-  A << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero), response.J.col(ServoParam::start);
-  const Eigen::Vector3d best = least_squares(A, readings);
+  Eigen::MatrixXd A(readings.size(), by_sign ? 4 : 3);  // the response is linear in these
+  A.leftCols<3>() << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero),
+      response.J.col(ServoParam::start);
+  if (by_sign) A.col(3) = rectified_response(log, kind, params);
+  const Eigen::VectorXd best = least_squares(A, readings);
   LinearFit fit;
   fit.params << best[0], tau_s, latency_s, best[1], best[2];
+  if (by_sign && best[0] != 0.0) fit.difference = best[3] / best[0];
   fit.sum2 = (A * best - readings).squaredNorm();
   return fit;
 }
@@ -108,7 +120,7 @@ std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
 }
 
 /// The best of a grid in time constant (by factors) and latency (up to a third of the log).
-ServoParams searched(std::span<const ServoSample> log, ServoKind kind) {
+LinearFit searched(std::span<const ServoSample> log, ServoKind kind, bool by_sign = false) {
   const std::vector<ServoSample> rows = thinned(log);
   const Eigen::VectorXd readings = readings_of(rows);
   const double duration_s = log.back().t_s - log.front().t_s;
@@ -116,14 +128,13 @@ ServoParams searched(std::span<const ServoSample> log, ServoKind kind) {
   std::vector<double> latencies{0.0};
   for (double late_s = 0.5 * step_s; late_s < duration_s / 3.0; late_s *= 1.4) latencies.push_back(late_s);
   LinearFit best;
-  best.sum2 = std::numeric_limits<double>::infinity();
   for (double tau_s = 0.3 * step_s; tau_s < 3.0 * duration_s; tau_s *= 1.6) {
     for (const double latency_s : latencies) {
-      const LinearFit fit = linear_fit(rows, kind, tau_s, latency_s, readings);
+      const LinearFit fit = linear_fit(rows, kind, tau_s, latency_s, readings, by_sign);
       if (fit.sum2 < best.sum2) best = fit;
     }
   }
-  return best.params;
+  return best;
 }
 
 /// (JᵀJ)⁻¹, by parameters scaled so that their units do not matter; none where it cannot be solved.
@@ -272,12 +283,39 @@ struct Solution {
   [[nodiscard]] const ServoFit& fit() const { return fits[believed]; }
 };
 
+/// A gain that differs by the command's sign makes a rate plant drift, which may be all that a search without it sees:
+/// where structure is left, the fit with flaws from a search with it, if that leaves clearly less.
+void try_gain_by_sign(std::span<const ServoSample> log, std::span<const std::size_t> flaws, ServoFit& fit,
+                      std::vector<ServoRival>& rivals) {
+  constexpr double max_correlation = 0.3, clearly = 0.9;
+  const Eigen::VectorXd misfit = flawed_misfit(log, fit);
+  if (!(std::abs(lag_one({misfit.data(), misfit.data() + misfit.size()})) > max_correlation)) return;
+  const LinearFit start = searched(log, fit.kind, true);
+  if (!(std::abs(start.difference) < 1.0)) return;
+  ServoFit trial = fit;
+  trial.params = start.params;
+  trial.flaws = {.gain_difference = start.difference};
+  trial.freed = {ServoFlaw::gain_difference};
+  refine_flawed(log, 40, trial);
+  trial.flaw_evidence = {};
+  trial.flaw_evidence[ServoFlaw::gain_difference] =
+      2.0 * effective_rows(flawed_misfit(log, trial)) * std::log(fit.rms_rad / trial.rms_rad);
+  std::vector<ServoRival> others;
+  trial = with_flaws(log, trial, flaws, others);
+  if (!(trial.rms_rad < clearly * fit.rms_rad)) return;
+  fit = trial;
+  rivals = others;
+}
+
 Solution with_flaws_tried(std::vector<ServoSample> log, const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
   Solution solution{std::move(log), fits, {}, 0, std::nullopt};
   // Where one kind explains the log as it is, the other is not made to.
   const std::vector<std::size_t> tried = indicated_flaws(solution.log, fits[believed_of(fits, rule)]);
-  for (std::size_t kind = 0; kind < 2 && !tried.empty(); ++kind)
+  for (std::size_t kind = 0; kind < 2 && !tried.empty(); ++kind) {
     solution.fits[kind] = with_flaws(solution.log, fits[kind], tried, solution.rivals[kind]);
+    if (std::ranges::count(tried, ServoFlaw::gain_difference) > 0)
+      try_gain_by_sign(solution.log, tried, solution.fits[kind], solution.rivals[kind]);
+  }
   solution.believed = believed_of(solution.fits, rule);
   return solution;
 }
@@ -291,8 +329,8 @@ double evidence_of_flaws(double rows, const ServoFit& plain, const ServoFit& fla
 /// As logged; or with commands that were given before their rows, if they explain more than flaws of the axis do.
 Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s, ServoKindRule rule) {
   const std::vector<ServoSample> log = sampled_log(as_read, sampled_t_s);
-  const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle)),
-                                     refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
+  const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
+                                     refined(log, ServoKind::rate, searched(log, ServoKind::rate).params)};
   Solution as_logged = with_flaws_tried(log, fits, rule);
   const std::array<std::optional<CommandTimes>, 2> times{command_times(log, fits[0]), command_times(log, fits[1])};
   std::array<ServoFit, 2> earlier = fits;

@@ -16,13 +16,14 @@ namespace {
 using Eigen::Index;
 
 constexpr double no_limit = 1e9;
+constexpr double gain_unit = 0.05, max_gain_change = 0.9;  ///< Of a step of one, and at most.
 constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one; beyond it nobody calls it a clock.
 
 /// A servo half-way through its log: an axis of gain and flaws as fitted, which counts its commands from zero.
 class FlawedServo {
  public:
   FlawedServo(const ServoFit& fit, const ServoFlaws& flaws, double first_command)
-      : fit_(fit), flaws_(flaws), lagged_(past_dead_band(first_command, flaws.dead_band)) {
+      : fit_(fit), flaws_(flaws), lagged_(goal_of(first_command, 0.0)) {
     const double max_rate = flaws.max_rate_rad_s > 0.0 ? flaws.max_rate_rad_s : no_limit;
     if (fit.kind == ServoKind::angle) {
       AnglePlant plant{fit.params[ServoParam::gain], AngleUnit::rad, fit.params[ServoParam::tau]};
@@ -41,9 +42,10 @@ class FlawedServo {
   }
   [[nodiscard]] double read_rad() const { return read_; }
 
-  void advance(double dt_s, double command) {
+  /// `share`: of the log's length, where this is.
+  void advance(double dt_s, double command, double share) {
     if (!(dt_s > 0.0)) return;
-    const double goal = past_dead_band(command, flaws_.dead_band), lag_s = flaws_.second_tau_s;
+    const double goal = goal_of(command, share), lag_s = flaws_.second_tau_s;
     if (!(lag_s > 0.0)) {
       move(dt_s, goal);
       return;
@@ -59,6 +61,12 @@ class FlawedServo {
   }
 
  private:
+  /// The command that an axis of the stated gain would have to follow.
+  [[nodiscard]] double goal_of(double command, double share) const {
+    const double difference = command > 0.0 ? flaws_.gain_difference : -flaws_.gain_difference;
+    return past_dead_band(command, flaws_.dead_band) * (1.0 + difference) * (1.0 + flaws_.gain_drift * (share - 0.5));
+  }
+
   /// The play follows piece by piece where the drive may turn back within a step.
   void move(double dt_s, double goal) {
     const auto* braking = std::get_if<AnglePlant>(&axis_.plant);
@@ -89,11 +97,11 @@ class FlawedServo {
   double lagged_, read_ = 0.0;
 };
 
-/// What a step of one is in a flaw's size: those of an axis have one sign, and go by factors; those of its log have
-/// either.
+/// What a step of one is in a flaw's size: those that have one sign go by factors.
 double unit_of(const ServoFit& fit, std::size_t flaw) {
   constexpr double turn_rad = 0.1;
   if (flaw == ServoFlaw::clock_rate) return clock_unit;
+  if (flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift) return gain_unit;
   if (flaw == ServoFlaw::earlier_command) return turn_rad / std::max(std::abs(fit.params[ServoParam::gain]), 1e-300);
   return fit.flaws.*servo_flaws[flaw];
 }
@@ -112,8 +120,12 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
       return next;
     }
     by = std::clamp(by, -1.0, 1.0);
-    size = flaw == ServoFlaw::clock_rate ? std::clamp(size + clock_unit * by, -max_clock_rate, max_clock_rate)
-                                         : size * std::exp(by);
+    if (flaw == ServoFlaw::clock_rate)
+      size = std::clamp(size + clock_unit * by, -max_clock_rate, max_clock_rate);
+    else if (flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift)
+      size = std::clamp(size + gain_unit * by, -max_gain_change, max_gain_change);
+    else
+      size *= std::exp(by);
     // Of two lags one is the shorter: the second.
     if (flaw == ServoFlaw::second_lag)
       size = std::clamp(size, 0.02 * next.params[ServoParam::tau], next.params[ServoParam::tau]);
@@ -189,6 +201,9 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
       return times(fit.params[ServoParam::tau] / (log.back().t_s - log.front().t_s), {-0.2, -0.02, 0.02, 0.2});
     case ServoFlaw::earlier_command:
       return times(max_command(log), {-1.0, 1.0});
+    case ServoFlaw::gain_difference:
+    case ServoFlaw::gain_drift:  // the response is nearly linear in them
+      return times(gain_unit, {-1.0, 1.0});
     default:
       return times(fit.params[ServoParam::tau], {0.1, 0.3, 0.6, 1.0});
   }
@@ -202,17 +217,20 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
   Eigen::VectorXd angles(static_cast<Index>(times_s.size()));
   double now_s = begin_s, command = log.front().command + flaws.earlier_command;
   FlawedServo servo(fit, flaws, command);
+  const double length_s = std::max(times_s.back() - begin_s, 1e-9);
+  const auto advance_to = [&](double until_s) {
+    servo.advance(until_s - now_s, command, (0.5 * (now_s + until_s) - begin_s) / length_s);
+    now_s = until_s;
+  };
   std::size_t next = 0;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     const double read_s = times_s[i] + flaws.clock_rate * (times_s[i] - begin_s);
     for (; next < log.size() && log[next].given_s() + fit.params[ServoParam::latency] <= read_s; ++next) {
       if (log[next].command == command) continue;
-      servo.advance(log[next].given_s() + fit.params[ServoParam::latency] - now_s, command);
-      now_s = log[next].given_s() + fit.params[ServoParam::latency];
+      advance_to(log[next].given_s() + fit.params[ServoParam::latency]);
       command = log[next].command;
     }
-    servo.advance(read_s - now_s, command);
-    now_s = read_s;
+    advance_to(read_s);
     angles[static_cast<Index>(i)] = fit.params[ServoParam::zero] + servo.read_rad();
   }
   return angles;

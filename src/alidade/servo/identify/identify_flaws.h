@@ -16,11 +16,13 @@ struct ServoFlaw {
     backlash,
     second_lag,
     clock_rate,
-    earlier_command
+    earlier_command,
+    gain_difference,
+    gain_drift
   };
 };
 
-/// The log's, not the axis': of either sign.
+/// The log's, not the axis'.
 [[nodiscard]] constexpr bool is_of_the_log(std::size_t flaw) {
   return flaw == ServoFlaw::clock_rate || flaw == ServoFlaw::earlier_command;
 }

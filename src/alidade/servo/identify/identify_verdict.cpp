@@ -96,7 +96,7 @@ void add_causes(std::span<const ServoSample> log, const ServoIdentification& ide
   const ServoFit& fit = identified.fit;
   const std::vector<ServoCause> causes = servo_causes(log, identified);
   Check check{.name = "causes",
-              .text = "neither limits, dead band, backlash, a second lag nor a drift of clocks show",
+              .text = "neither limits, dead band, backlash, a second lag, a drift of clocks nor another gain show",
               .unit = "σ"};
   check.limit = 4.0;
   if (!fit.freed.empty()) {

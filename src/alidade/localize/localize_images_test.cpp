@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -9,6 +10,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/detect/image_sequence.h"
+#include "alidade/localize/checks/judge.h"
+#include "alidade/localize/path/whole_path.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/tables/localize_file.h"
 #include "alidade/testing/room_film.h"
@@ -182,6 +185,33 @@ TEST(LocalizeImages, ReinitialisesWhereItsObservationsContradictIt) {
   }
   // The same points are seen before and after it.
   EXPECT_EQ(report.num_untied, 0u);
+}
+
+/// What of a reinitialised path is seen on both sides, by how many points, is said: where too few are the same, what is
+/// before it may be anywhere, as in another room with the same target.
+TEST(LocalizeImages, APathThatIsNotTiedToWhatFollowsIsNotTrusted) {
+  Localization report = localized(usual_room(), by_hand());
+  ASSERT_EQ(report.num_restarts, 0u);
+  report.path[45].event = FrameEvent::restarted;
+  report.num_restarts = 1;
+  const auto said = [&](long num_shared) {  // points 0 to 9 before, and others after but for so many
+    std::vector<PlacedResidual> residuals;
+    for (std::size_t k = 0; k < report.path.size(); ++k)
+      for (long i = 0; i < 10; ++i)
+        residuals.push_back({k, k >= 45 && i >= num_shared ? 100 + i : i, {}, {}, 0.11, 1.0});
+    report.num_untied = num_untied(residuals, 0, report.path);
+    const Verdict verdict = localize_verdict(report);
+    return std::ranges::find(verdict.checks, "restarts", &Check::name)->state;
+  };
+  EXPECT_EQ(said(8), State::good);
+  EXPECT_EQ(said(7), State::care);
+  EXPECT_EQ(said(0), State::care);
+  EXPECT_NE(localize_verdict(report).sentence.find("do not trust the path before it"), std::string::npos);
+  // Points that were last seen long before tie nothing.
+  std::vector<PlacedResidual> gap;
+  for (std::size_t k = 0; k < report.path.size(); ++k)
+    for (long i = 0; i < 10 && (k < 20 || k >= 45); ++i) gap.push_back({k, i, {}, {}, 0.11, 1.0});
+  EXPECT_EQ(num_untied(gap, 0, report.path), 1u);
 }
 
 RoomFilm with_focal_length(double share) {

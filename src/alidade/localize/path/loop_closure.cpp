@@ -291,4 +291,10 @@ LoopClosure close_loops(const std::map<long, long>& number_of, double max_at_onc
   return LoopCloser(number_of, problem).close(max_at_once);
 }
 
+bool fits_as_well(const SmoothedPath& closed, const SmoothedPath& open, std::size_t num_joined, double gate) {
+  constexpr double most_a_point = 100.0;
+  const double rise = cost_of(closed, gate, CostBy::found_sigma) - cost_of(open, gate, CostBy::found_sigma);
+  return rise < most_a_point * static_cast<double>(num_joined);
+}
+
 }  // namespace alidade

@@ -154,6 +154,30 @@ TEST(LoopClosure, NumbersThatAreUsedAgainForOtherPointsCloseNone) {
   EXPECT_EQ(result.num_loops, 0u);
 }
 
+/// A path of which each of so many points has forty residuals of one size.
+SmoothedPath path_of(std::size_t num_points, double residual_px) {
+  SmoothedPath path;
+  for (std::size_t i = 0; i < num_points; ++i)
+    for (std::size_t k = 0; k < 40; ++k)
+      path.residuals.push_back(
+          {k, static_cast<long>(i), Eigen::Vector2d::Zero(), Eigen::Vector2d(residual_px, 0.0), 0.11, 1.0});
+  return path;
+}
+
+/// Corners that are chosen anew a fifth of a pixel away are still the same; a place taken for one like it is not.
+TEST(LoopClosure, APlaceThatLooksAlikeCostsMoreThanACornerThatIsChosenAnew) {
+  constexpr std::size_t num = 30;
+  constexpr double gate = 13.8;
+  const SmoothedPath open = path_of(num, 0.05);
+  EXPECT_TRUE(fits_as_well(open, open, num, gate));
+  EXPECT_TRUE(fits_as_well(path_of(num, 0.17), open, num, gate));   // 40 (0.17² − 0.05²)/0.11² = 87 a point
+  EXPECT_FALSE(fits_as_well(path_of(num, 0.20), open, num, gate));  // 124
+  EXPECT_FALSE(fits_as_well(path_of(num, 0.17), open, num / 2, gate));
+  SmoothedPath dropped = open;  // the same where they no longer fit at all
+  dropped.num_dropped = 10 * num;
+  EXPECT_FALSE(fits_as_well(dropped, open, num, gate));
+}
+
 TEST(LoopClosure, ADepthSensorSaysHowLongTheWalkIs) {
   const WalkRun run = out_and_back(5);
   LocalizeConfig config = gentle();

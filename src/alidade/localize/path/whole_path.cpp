@@ -31,23 +31,6 @@ void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::sp
   }
 }
 
-/// How often the filter was reinitialised where hardly a point fits the smoothed path on both sides: what is before it
-/// may then be anywhere.
-void count_untied(const SmoothedPath& smoothed, std::size_t first_frame, Localization& result) {
-  constexpr std::size_t near = 15, enough = 8;
-  result.num_untied = 0;
-  for (std::size_t k = first_frame; k < result.path.size(); ++k) {
-    if (result.path[k].event != FrameEvent::restarted) continue;
-    std::set<long> before, both;
-    for (const PlacedResidual& residual : smoothed.residuals) {
-      const std::size_t at = first_frame + residual.frame;
-      if (at + near >= k && at < k) before.insert(residual.id);
-      if (at >= k && at <= k + near && before.contains(residual.id)) both.insert(residual.id);
-    }
-    result.num_untied += both.size() < enough ? 1 : 0;
-  }
-}
-
 /// Without a target a second initial guess is tried where errors last from frame to frame: as they do on real films,
 /// and in the wrong one of two minima.
 std::optional<SmoothedPath> best_path(const SmootherProblem& problem) {
@@ -76,7 +59,7 @@ std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<con
     step.cov = smoothed->cov[k];
   }
   judge_frames(*smoothed, problem.first_frame, frames, result);
-  count_untied(*smoothed, problem.first_frame, result);
+  result.num_untied = num_untied(smoothed->residuals, problem.first_frame, result.path);
   return smoothed;
 }
 
@@ -98,15 +81,6 @@ void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& probl
     points.push_back(point);
   }
   problem.points = std::move(points);
-}
-
-/// Whether points that were joined are one: the path with them explains the observations but for what the same corner,
-/// chosen anew, is off by, a quarter of a pixel (a hundred in σ² over some forty observations of each). A place taken
-/// for one a metre away bends the path, and costs ten times that. Both by the same weights.
-bool fits_as_well(const SmoothedPath& closed, const SmoothedPath& open, std::size_t num_joined, double gate) {
-  constexpr double most_a_point = 100.0;
-  const double rise = cost_of(closed, gate, CostBy::found_sigma) - cost_of(open, gate, CostBy::found_sigma);
-  return rise < most_a_point * static_cast<double>(num_joined);
 }
 
 /// With its loops closed, where that settles and fits as well as without.
@@ -308,6 +282,23 @@ double solve_with_imu(const Recording& recording, const LocalizeConfig& config, 
 }
 
 }  // namespace
+
+std::size_t num_untied(std::span<const PlacedResidual> residuals, std::size_t first_frame,
+                       std::span<const PathStep> path) {
+  constexpr std::size_t near = 15, enough = 8;
+  std::size_t num = 0;
+  for (std::size_t k = first_frame; k < path.size(); ++k) {
+    if (path[k].event != FrameEvent::restarted) continue;
+    std::set<long> before, both;
+    for (const PlacedResidual& residual : residuals) {
+      const std::size_t at = first_frame + residual.frame;
+      if (at + near >= k && at < k) before.insert(residual.id);
+      if (at >= k && at <= k + near && before.contains(residual.id)) both.insert(residual.id);
+    }
+    num += both.size() < enough ? 1 : 0;
+  }
+  return num;
+}
 
 std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEngine& engine,
                                     const LocalizeConfig& config, Localization& result) {

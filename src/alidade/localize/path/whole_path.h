@@ -32,6 +32,11 @@ struct WholePath {
 [[nodiscard]] std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEngine& engine,
                                                   const LocalizeConfig& config, Localization& result);
 
+/// How often the filter was reinitialised where hardly a point fits the smoothed path on both sides: what is before it
+/// may then be anywhere. Residuals in order of their frames, of which the first is the path's `first_frame`.
+[[nodiscard]] std::size_t num_untied(std::span<const PlacedResidual> residuals, std::size_t first_frame,
+                                     std::span<const PathStep> path);
+
 /// The map as that path sees it, with the points that left the filter. `result` has the filter's map.
 void take_over(const std::optional<WholePath>& whole, const Recording& recording, const LocalizeEngine& engine,
                const LocalizeConfig& config, Localization& result);

@@ -27,9 +27,10 @@ struct Hover {
   double sway = 1.0;  ///< Share of its translation: at 0 it rotates in place,
   double turn = 1.0;  ///< and of its rotation: at 0 of both it stands still.
   // What is not as given.
-  double readout_s = 0.0;           ///< From the first row to the last, the time being that of the central one.
-  double target_speed_m_s = 0.0;    ///< Along x, against the other points.
-  double target_stretch = 0.0;      ///< Of the known points along x, relative.
+  double readout_s = 0.0;         ///< From the first row to the last, the time being that of the central one.
+  double target_speed_m_s = 0.0;  ///< Along x, against the other points.
+  Eigen::Vector3d target_turn_rad_s = Eigen::Vector3d::Zero();  ///< Of it about its origin.
+  double target_stretch = 0.0;                                  ///< Of the known points along x, relative.
   double max_mismatched_px = 20.0;  ///< Of a share of the observations after the first frame, in each coordinate.
   double mismatches = 0.0;
 };
@@ -181,7 +182,9 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
       if (scene.mismatches > 0.0 && draws.uniform() < scene.mismatches && k > 0)
         noise = scene.max_mismatched_px * Eigen::Vector2d(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
       Eigen::Vector3d point = run.points[i];
-      if (i < run.target.size()) point.x() += scene.target_speed_m_s * t_s;
+      if (i < run.target.size())
+        point =
+            exp_so3(t_s * scene.target_turn_rad_s) * point + scene.target_speed_m_s * t_s * Eigen::Vector3d::UnitX();
       const auto px = hover::seen_at(scene, lens, motion, point, t_s);
       if (i % 3 == 0) noise *= scene.loose;
       if (px) frame.observations.push_back({static_cast<long>(i) + 1, *px + noise, 0.0});

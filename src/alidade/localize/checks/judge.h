@@ -31,6 +31,14 @@ void add_sensors(const Localization& report, Verdict& verdict);
 /// than that, as those of a still camera, nothing is said.
 [[nodiscard]] double supported_z(const GivenNumber& given, const Camera& camera);
 
+/// By how many of its σ the path moves where something given is as the observations ask: of a target that does not
+/// stand still also by where it was half of the time before or after its mean, as the world is then anywhere between.
+[[nodiscard]] double moved_sigmas(const GivenNumber& given, const Localization& result);
+
+/// What the observations ask of something given, with its size; where the path is solved with an IMU, together with its
+/// readings.
+[[nodiscard]] std::string cause_text(const GivenNumber& given, const Localization& result);
+
 /// Of a lens that the observations contradict, what of it is not as it was given: "focal length +2.1 % (12σ), centre u
 /// -3 px (8σ), k1 -0.02 (20σ)".
 [[nodiscard]] std::string lens_changes(const Localization& result);

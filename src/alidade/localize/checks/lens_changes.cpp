@@ -1,11 +1,50 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 
 #include "alidade/localize/checks/judge.h"
 
 namespace alidade {
+namespace {
+
+/// "0.5 %", "3 px", "12 ms": what the observations ask for.
+std::string asked_text(const GivenNumber& given) {
+  const double asked = given.asked;
+  if (given.name == "focal length" || given.name == "shape of the target") return text_of(100.0 * asked, 2) + " %";
+  if (given.name.starts_with("centre")) return text_of(asked, 2) + " px";
+  if (given.name == "speed of the target") return text_of(1000.0 * std::abs(asked), 2) + " mm/s";
+  if (given.name == "rotation of the target") return text_of(std::abs(asked) * 180.0 / std::numbers::pi, 2) + "°/s";
+  if (given.name == "readout") return text_of(1000.0 * asked, 2) + " ms";
+  return text_of(asked, 2);
+}
+
+}  // namespace
+
+double moved_sigmas(const GivenNumber& given, const Localization& report) {
+  const double moved = std::abs(given.asked * given.moves);
+  const bool is_speed = given.name == "speed of the target", is_rotation = given.name == "rotation of the target";
+  if (!is_speed && !is_rotation) return moved;
+  double least = std::numeric_limits<double>::infinity();
+  for (const PathStep& step : report.path)
+    if (step.has_pose()) least = std::min(least, step.cov.diagonal().segment<3>(is_speed ? 0 : 3).minCoeff());
+  const double half_s = 0.5 * (report.path.back().t_s - report.path.front().t_s);
+  return std::max(moved, half_s * std::abs(given.asked) / std::sqrt(least));
+}
+
+std::string cause_text(const GivenNumber& given, const Localization& report) {
+  const std::string size = asked_text(given), z = " (" + text_of(std::abs(given.z), 2) + "σ)";
+  if (given.name == "shape of the target") return "the target is longer along x, against y, than given, by " + size + z;
+  if (given.name == "speed of the target") return "the target moves against the other points, by " + size + z;
+  if (given.name == "rotation of the target") return "the target rotates against the other points, by " + size + z;
+  if (given.name == "readout")
+    return "rows are not of one moment: a rolling shutter of " + size + " from the first to the last" + z;
+  const bool has_imu = report.imu && report.imu->fault == ImuFault::none;
+  return "the observations indicate another " + std::string(given.name) + ", by " + size + z +
+         ": the camera file is not of this lens as it was used" +
+         (has_imu ? ", or the IMU's rates (scale, axes) are not as they say" : "");
+}
 
 double supported_z(const GivenNumber& given, const Camera& camera) {
   constexpr double any_focal = 0.2, any_centre = 0.05, any_k1 = 0.3;  // as a path's lens is freed: path_lens.cpp

@@ -113,26 +113,6 @@ std::string restarts_text(const Localization& report) {
   return text;
 }
 
-/// "0.5 %", "3 px", "12 ms": what the observations ask for.
-std::string asked_text(const GivenNumber& given) {
-  const double asked = given.asked;
-  if (given.name == "focal length" || given.name == "shape of the target") return text_of(100.0 * asked, 2) + " %";
-  if (given.name.starts_with("centre")) return text_of(asked, 2) + " px";
-  if (given.name == "speed of the target") return text_of(1000.0 * std::abs(asked), 2) + " mm/s";
-  if (given.name == "readout") return text_of(1000.0 * asked, 2) + " ms";
-  return text_of(asked, 2);
-}
-
-std::string cause_text(const GivenNumber& given) {
-  const std::string size = asked_text(given), z = " (" + text_of(std::abs(given.z), 2) + "σ)";
-  if (given.name == "shape of the target") return "the target is longer along x, against y, than given, by " + size + z;
-  if (given.name == "speed of the target") return "the target moves against the other points, by " + size + z;
-  if (given.name == "readout")
-    return "rows are not of one moment: a rolling shutter of " + size + " from the first to the last" + z;
-  return "the observations indicate another " + std::string(given.name) + ", by " + size + z +
-         ": the camera file is not of this lens as it was used";
-}
-
 /// Of what was given, the one of which the observations ask most: a wrong lens moves the others' scores, too. From one
 /// place the target looks as much shorter as it is tilted, which is not linear: nothing is said of its shape.
 void add_given(const Localization& report, Verdict& verdict) {
@@ -143,8 +123,9 @@ void add_given(const Localization& report, Verdict& verdict) {
   }
   constexpr double care_z = 3.5, bad_z = 15.0, min_move = 0.5;
   const double z = worst != nullptr ? supported_z(*worst, report.camera) : 0.0;
-  if (z > care_z && std::abs(worst->asked * worst->moves) > min_move)
-    verdict.checks.push_back({"camera", state_of(z, care_z, bad_z), cause_text(*worst), z, care_z, "σ", "path"});
+  if (z > care_z && moved_sigmas(*worst, report) > min_move)
+    verdict.checks.push_back(
+        {"camera", state_of(z, care_z, bad_z), cause_text(*worst, report), z, care_z, "σ", "path"});
   if (report.given_camera) {
     constexpr double much = 0.2;
     const double gated = gated_share(report);

@@ -69,7 +69,8 @@ bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> targe
 namespace {
 
 bool is_of_targets_points(const GivenNumber& given) {
-  return given.name == "shape of the target" || given.name == "speed of the target" || given.name == "readout";
+  return given.name == "shape of the target" || given.name == "speed of the target" || given.name == "readout" ||
+         given.name == "rotation of the target";
 }
 
 std::size_t num_known_fit(const SmoothedPath& smoothed, std::span<const MapPoint> map) {

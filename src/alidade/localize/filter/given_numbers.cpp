@@ -74,6 +74,7 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
   add("shape of the target", at_cause(shape_cause), std::nullopt);
   for (int axis = 0; axis < 3; ++axis) add("speed of the target", at_cause(speed_cause + axis), std::nullopt);
   add("readout", at_cause(readout_cause), std::nullopt);
+  for (int axis = 0; axis < 3; ++axis) add("rotation of the target", at_cause(turn_cause + axis), std::nullopt);
   return all;
 }
 

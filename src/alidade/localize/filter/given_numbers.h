@@ -6,7 +6,8 @@
 namespace alidade {
 
 /// What is left of a path's normal equations for the parameters that are given: those of the lens by their indices in
-/// it, then the target's scale; of a smoothed path also its shape, its speed (3) and the image's readout.
+/// it, then the target's scale; of a smoothed path also its shape, its speed (3), the image's readout and its rotation
+/// (3).
 struct GivenSystem {
   const Camera& camera;
   const std::vector<int>& lens_params;
@@ -20,7 +21,8 @@ struct GivenSystem {
 
 /// Focal length (relative), centre (px), k1 (absolute, in a hundredth) and scale of the target (relative), as far as
 /// they are given and not estimated.
-/// Then of a smoothed path: shape of the target (x longer and y shorter, relative), its speed (m/s), readout (s).
+/// Then of a smoothed path: shape of the target (x longer and y shorter, relative), its speed (m/s), readout (s), and
+/// how fast the target rotates about its centre (rad/s).
 [[nodiscard]] std::vector<GivenNumber> given_numbers(const GivenSystem& system);
 
 /// What was given to a filter, over a run: the largest moves of its poses, and what its observations said.

@@ -57,7 +57,7 @@ void PathSmoother::free_lens() {
 double PathSmoother::best_cause(const Asked& all) const {
   const Eigen::Index causes = causes_at_ - lens_at_;
   double best = 0.0;
-  for (const auto& [first, num] : {std::pair{shape_cause, 1}, {speed_cause, 3}, {readout_cause, 1}}) {
+  for (const auto& [first, num] : {std::pair{shape_cause, 1}, {speed_cause, 3}, {readout_cause, 1}, {turn_cause, 3}}) {
     const Eigen::MatrixXd information = all.information.block(causes + first, causes + first, num, num);
     const Eigen::VectorXd score = all.score.segment(causes + first, num);
     if (information.diagonal().minCoeff() > 0.0) best = std::max(best, score.dot(information.ldlt().solve(score)));

@@ -16,10 +16,13 @@ PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, std::
   const auto num_lens = view.J_px_lens.cols();
   GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
   for (Eigen::Index k = 0; k < num_lens; ++k) J.col(k) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(k)]);
-  if (problem_.points[point_of_[i]]
-          .given_in_world)  // a target that moves: not where it is given to be, but further by so much
-    J.middleCols<3>(num_lens + speed_cause) =
+  if (const auto& given = problem_.points[point_of_[i]].given_in_world) {
+    // A target that moves, or rotates about its centre: not where it is given to be, but further by so much.
+    const Eigen::Matrix<double, 2, 3> J_speed =
         (problem_.t_s[observation.frame] - mid_s_) * view.J_px_feature.leftCols<3>();
+    J.middleCols<3>(num_lens + speed_cause) = J_speed;
+    J.middleCols<3>(num_lens + turn_cause) = -J_speed * cross_matrix(*given - target_centre_);
+  }
   const double rows =
       observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its central row
   J.col(num_lens + readout_cause) = rows * view.J_px_pose * twist;

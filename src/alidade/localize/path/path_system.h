@@ -34,7 +34,8 @@ struct SmootherSystem {
 };
 
 /// Behind the lens in the border: see given_numbers.h.
-inline constexpr int num_causes = 6, scale_cause = 0, shape_cause = 1, speed_cause = 2, readout_cause = 5;
+inline constexpr int num_causes = 9, scale_cause = 0, shape_cause = 1, speed_cause = 2, readout_cause = 5,
+                     turn_cause = 6;
 
 class PathSmoother {
  public:

@@ -55,7 +55,7 @@ struct MapPoint {
 /// the value that it would take were it estimated too, by the linearisation at the solution.
 struct GivenNumber {
   /// "focal length", "centre u", "centre v", "k1", "scale of the target", "shape of the target", "speed of the target",
-  /// "readout" (of a rolling shutter, first row to last), "clock"
+  /// "rotation of the target", "readout" (of a rolling shutter, first row to last), "clock"
   std::string_view name;
   double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px, m/s, s), in its σ,
   std::string_view moved = {};  ///< which that is,
@@ -76,8 +76,9 @@ struct SensorScale {
   double aside_rad = 0.0;  ///< By which a rangefinder's beam points elsewhere than given, where it does: corrected.
   /// Share of the scale that an offset of 0.1 m of a rangefinder's readings would be, where it would not show; else 0.
   double hidden_offset_rel = 0.0;
-  double lag_s = 0.0;         ///< Time constant of the filter of a depth sensor or odometry, if any: corrected.
-  double acceleration = 0.0;  ///< RMS of the camera's by this scale, over the one that is given.
+  double lag_s = 0.0;                 ///< Time constant of the filter of a depth sensor or odometry, if any: corrected.
+  double acceleration = 0.0;          ///< RMS of the camera's by this scale, over the one that is given.
+  double jump_m = 0.0, jump_s = 0.0;  ///< By which a depth sensor reads more from a time on, where it does: corrected.
 };
 
 /// Mean radial residual in rings about the principal point.

@@ -71,11 +71,20 @@ namespace {
 
 constexpr double rejected_beyond = 4.0;  // of their robust σ
 
+/// Readings of a depth sensor, and from when on they have another offset.
+struct Depths {
+  std::span<const DepthReading> readings;
+  double jump_s = std::numeric_limits<double>::infinity();
+};
+
+using DepthVector = Eigen::Vector<double, 5>;
+using DepthMatrix = Eigen::Matrix<double, 5, 5>;
+
 /// A reading's depth, and where the camera was.
 struct DepthRow {
   double depth_m = 0.0, weight = 1.0;
-  Eigen::Vector4d row = Eigen::Vector4d::Zero();  ///< Position, and one for the offset.
-  double left = 0.0;                              ///< Of the depth, in σ.
+  DepthVector row = DepthVector::Zero();  ///< Position, one for the offset, and one after a jump.
+  double left = 0.0;                      ///< Of the depth, in σ.
 };
 
 /// How much less than their number they determine whose neighbours are alike: an autoregression of first order.
@@ -90,13 +99,14 @@ double inflation(std::span<const DepthRow> rows) {
 }
 
 struct DepthFit {
-  Eigen::Vector4d values = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();  ///< By the given σ.
+  DepthVector values = DepthVector::Zero();
+  DepthMatrix cov = DepthMatrix::Zero();  ///< By the given σ.
+  double limit = 0.0;                     ///< Beyond which a reading is rejected, in σ.
 };
 
 std::optional<DepthFit> fitted(std::vector<DepthRow>& rows) {
-  Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d g = Eigen::Vector4d::Zero();
+  DepthMatrix H = DepthMatrix::Zero();
+  DepthVector g = DepthVector::Zero();
   for (const DepthRow& row : rows) {
     H += row.weight * row.weight * row.row * row.row.transpose();
     g += row.weight * row.weight * row.depth_m * row.row;
@@ -104,21 +114,23 @@ std::optional<DepthFit> fitted(std::vector<DepthRow>& rows) {
   // A path in a plane, or on a line, determines nothing of the direction across it: as good as none of it is downwards.
   constexpr double hardly = 1e-9;
   H.diagonal().head<3>().array() += hardly * H.diagonal().head<3>().sum();
-  const Eigen::LDLT<Eigen::Matrix4d> ldlt(H);
+  if (H(4, 4) == 0.0) H(4, 4) = 1.0;  // no jump
+  const Eigen::LDLT<DepthMatrix> ldlt(H);
   if (ldlt.info() != Eigen::Success) return std::nullopt;
-  DepthFit fit{ldlt.solve(g), ldlt.solve(Eigen::Matrix4d::Identity())};
+  DepthFit fit{ldlt.solve(g), ldlt.solve(DepthMatrix::Identity())};
   if (!fit.values.allFinite() || !fit.cov.allFinite()) return std::nullopt;
   for (DepthRow& row : rows) row.left = row.weight * (row.depth_m - fit.values.dot(row.row));
   return fit;
 }
 
-std::vector<DepthRow> rows_at(std::span<const DepthReading> readings, double late_s, std::span<const PathStep> path) {
+std::vector<DepthRow> rows_at(const Depths& depths, double late_s, std::span<const PathStep> path) {
   std::vector<DepthRow> rows;
-  for (const DepthReading& reading : readings) {
+  for (const DepthReading& reading : depths.readings) {
     const auto pose = pose_at(path, reading.t_s - late_s);
     if (!pose) continue;
-    DepthRow row{reading.depth_m, 1.0 / reading.sigma_m, Eigen::Vector4d::Ones(), 0.0};
+    DepthRow row{reading.depth_m, 1.0 / reading.sigma_m, DepthVector::Ones(), 0.0};
     row.row.head<3>() = pose->translation;
+    row.row[4] = reading.t_s > depths.jump_s ? 1.0 : 0.0;
     rows.push_back(row);
   }
   return rows;
@@ -136,6 +148,7 @@ std::optional<DepthFit> fitted_without_far(std::vector<DepthRow>& rows) {
     std::vector<double> sizes;
     for (const DepthRow& row : rows) sizes.push_back(std::abs(row.left));
     const double limit = rejected_beyond * std::max(1.0, normal_from_mad * median_of(std::move(sizes)));
+    fit->limit = limit;
     if (round + 1 < rounds) std::erase_if(rows, [&](const DepthRow& row) { return std::abs(row.left) > limit; });
   }
   return fit;
@@ -151,14 +164,14 @@ double misfit_of(std::vector<DepthRow> rows) {
 
 /// How late the readings' clock is, where that explains clearly more than no offset: the least of a parabola through
 /// the best of a grid.
-double clock_of(std::span<const DepthReading> readings, std::span<const PathStep> path) {
+double clock_of(const Depths& depths, std::span<const PathStep> path) {
   constexpr double step_s = 0.05, clear = 12.0;  // of χ², 3.5σ
   constexpr int most = 20;
   std::array<double, 2 * most + 1> misfits{};
   for (int i = -most; i <= most; ++i)
-    misfits[static_cast<std::size_t>(i + most)] = misfit_of(rows_at(readings, step_s * i, path));
+    misfits[static_cast<std::size_t>(i + most)] = misfit_of(rows_at(depths, step_s * i, path));
   const auto best = static_cast<std::size_t>(std::ranges::min_element(misfits) - misfits.begin());
-  std::vector<DepthRow> rows = rows_at(readings, step_s * (static_cast<double>(best) - most), path);
+  std::vector<DepthRow> rows = rows_at(depths, step_s * (static_cast<double>(best) - most), path);
   if (best == 0 || best + 1 == misfits.size() || !std::isfinite(misfits[best - 1] + misfits[best + 1]) ||
       !fitted_without_far(rows))
     return 0.0;
@@ -178,24 +191,26 @@ struct Follows {
 /// A filter delays what it is shown by its time constant, as a late clock does, and makes it smaller, as no clock does:
 /// that with the least misfit, if it explains clearly more than the clock alone. Nothing is looked for where the clock
 /// is right and neighbours err by themselves.
-Follows follows(std::span<const DepthReading> readings, double late_s, std::span<const PathStep> path) {
+Follows follows(const Depths& depths, double late_s, std::span<const PathStep> path) {
   constexpr double first_s = 0.05, last_s = 2.0, ratio = 1.1, step_s = 0.05, clear = 12.0, half_clear = 4.0,
                    alike = 3.0;
   constexpr int most = 2;  // beside a filter, the clock is right
-  std::vector<DepthRow> rows = rows_at(readings, late_s, path);
+  std::vector<DepthRow> rows = rows_at(depths, late_s, path);
+  const std::size_t num_given = rows.size();
   Follows best{.late_s = late_s, .misfit = misfit_of(rows)};
   const Follows clock = best;
   if (!fitted_without_far(rows) || (late_s == 0.0 && inflation(rows) < alike)) return clock;
   for (double tau_s = first_s; tau_s < last_s; tau_s *= ratio) {
     const std::vector<PathStep> shown = filtered(path, tau_s);
+    if (2 * rows_at(depths, 0.0, shown).size() < num_given) break;  // what is left of the readings fits anything
     for (int k = -most; k <= most; ++k) {
       const double late = k * step_s;
-      const double misfit = misfit_of(rows_at(readings, late, shown));
+      const double misfit = misfit_of(rows_at(depths, late, shown));
       if (misfit < best.misfit) best = {.tau_s = tau_s, .late_s = late, .misfit = misfit};
     }
   }
   if (best.tau_s == 0.0) return clock;
-  std::vector<DepthRow> explained = rows_at(readings, best.late_s, filtered(path, best.tau_s));
+  std::vector<DepthRow> explained = rows_at(depths, best.late_s, filtered(path, best.tau_s));
   if (!fitted_without_far(explained)) return clock;
   const double unit = best.misfit * inflation(explained) / static_cast<double>(explained.size());
   const double gain = (clock.misfit - best.misfit) / unit;
@@ -205,29 +220,88 @@ Follows follows(std::span<const DepthReading> readings, double late_s, std::span
   return doubtful;
 }
 
+/// How all readings fit: where one is far off, as far as it would just not be rejected.
+struct DepthCost {
+  double cost = std::numeric_limits<double>::infinity();  ///< Mean, in σ².
+  double unit = 1.0;                                      ///< Of it, what one of them all is by chance.
+  double alike = 1.0, rejected = 0.0;                     ///< Inflation, and share.
+  double limit = 0.0;                                     ///< Beyond which they are, in σ.
+};
+
+DepthCost cost_of(const std::vector<DepthRow>& rows, std::optional<double> limit = {}) {
+  std::vector<DepthRow> near = rows;
+  const auto fit = fitted_without_far(near);
+  if (!fit) return {};
+  DepthCost cost{0.0, 1.0, inflation(near), 0.0, limit.value_or(fit->limit)};
+  const auto num = static_cast<double>(rows.size());
+  for (const DepthRow& row : rows) {
+    const double left = row.weight * (row.depth_m - fit->values.dot(row.row));
+    cost.cost += std::min(left * left, cost.limit * cost.limit) / num;
+    cost.rejected += std::abs(left) > cost.limit ? 1.0 / num : 0.0;
+  }
+  cost.unit = std::max(1.0, cost.cost) * cost.alike / num;
+  return cost;
+}
+
+/// When the readings begin to have another offset, as where a sensor is set to zero or moved on its vehicle: where that
+/// explains clearly more than nothing, a clock or a filter (5.5σ at one of a hundred times), and leaves nothing that
+/// neighbours share, as a tide would. Without it the rest of the path goes up or down by the jump, and what is left
+/// looks like a filter. Nothing is looked for where neighbours err by themselves.
+double jump_of(const Depths& depths, std::span<const PathStep> path) {
+  constexpr double clear = 30.0, alike = 3.0, few = 0.05;
+  constexpr std::size_t ends = 5, most = 100;
+  const std::vector<DepthRow> rows = rows_at(depths, 0.0, path);
+  const DepthCost without = cost_of(rows);
+  std::vector<double> t_s;
+  for (const DepthReading& reading : depths.readings)
+    if (pose_at(path, reading.t_s)) t_s.push_back(reading.t_s);
+  if (t_s.size() < 4 * ends || (without.alike < alike && without.rejected < few)) return Depths{}.jump_s;
+  std::size_t best = 0;
+  DepthCost least;
+  const auto look = [&](std::size_t from, std::size_t to, std::size_t stride) {
+    for (std::size_t k = std::max(from, ends); k <= std::min(to, t_s.size() - ends); k += stride) {
+      const DepthCost at = cost_of(rows_at({depths.readings, 0.5 * (t_s[k - 1] + t_s[k])}, 0.0, path));
+      if (at.cost < least.cost) least = at, best = k;
+    }
+  };
+  const std::size_t stride = std::max(t_s.size() / most, std::size_t{1});
+  look(ends, t_s.size() - ends, stride);
+  if (stride > 1 && best > 0) look(best - stride + 1, best + stride - 1, std::max(stride / 10, std::size_t{1}));
+  const auto is_worse = [&](const std::vector<DepthRow>& other) {
+    return cost_of(other, least.limit).cost - least.cost > clear * least.unit;
+  };
+  if (best == 0 || !(least.alike < alike) || !is_worse(rows)) return Depths{}.jump_s;
+  const Follows other = follows(depths, clock_of(depths, path), path);
+  const auto shown = other.tau_s > 0.0 ? filtered(path, other.tau_s) : std::vector(path.begin(), path.end());
+  return is_worse(rows_at(depths, other.late_s, shown)) ? 0.5 * (t_s[best - 1] + t_s[best]) : Depths{}.jump_s;
+}
+
 }  // namespace
 
 std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
                                         std::span<const PathStep> path) {
-  const Follows found = follows(readings, clock_of(readings, path), path);
+  Depths depths{readings};
+  depths.jump_s = jump_of(depths, path);
+  const Follows found = follows(depths, clock_of(depths, path), path);
   std::vector<DepthRow> rows = rows_at(
-      readings, found.late_s, found.tau_s > 0.0 ? filtered(path, found.tau_s) : std::vector(path.begin(), path.end()));
+      depths, found.late_s, found.tau_s > 0.0 ? filtered(path, found.tau_s) : std::vector(path.begin(), path.end()));
   const std::size_t num_given = rows.size();
   const auto fit = fitted_without_far(rows);
   if (!fit) return std::nullopt;
   const Eigen::Vector3d g = fit->values.head<3>();
   double squares = 0.0;
   for (const DepthRow& row : rows) squares += row.left * row.left;
-  const double worse = std::max(1.0, squares / (static_cast<double>(rows.size()) - 4.0)) * inflation(rows);
+  const double worse = std::max(1.0, squares / (static_cast<double>(rows.size()) - 5.0)) * inflation(rows);
   const Eigen::Matrix3d cov = worse * fit->cov.topLeftCorner<3, 3>();
   ReadScale read{g.norm(), 1.0, rows.size(), num_given - rows.size(), found.late_s, 0.0, 0.0, 0.0, found.tau_s};
+  if (std::isfinite(depths.jump_s)) read.jump_m = fit->values[4], read.jump_s = depths.jump_s;
   if (!(read.scale > 0.0)) return std::nullopt;
   const Eigen::Vector3d along = g / read.scale;
   const double variance = along.dot(cov * along), across = cov.trace() - variance;
   // |g| grows by what is not known across it.
   read.sigma_rel = std::hypot(std::sqrt(variance) / read.scale, 0.5 * across / (read.scale * read.scale), sigma_rel);
   if (found.rival_tau_s > 0.0) {
-    std::vector<DepthRow> others = rows_at(readings, found.rival_late_s, filtered(path, found.rival_tau_s));
+    std::vector<DepthRow> others = rows_at(depths, found.rival_late_s, filtered(path, found.rival_tau_s));
     const auto other = fitted_without_far(others);
     if (other) read.sigma_rel = std::hypot(read.sigma_rel, std::log(other->values.head<3>().norm() / read.scale));
   }

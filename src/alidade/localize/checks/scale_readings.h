@@ -23,7 +23,8 @@ struct ReadScale {
   double aside_rad = 0.0;  ///< By which a rangefinder's beam points elsewhere, where it does.
   /// Share of the scale that 0.1 m too much of every reading would be, where it would not show; else 0.
   double hidden_offset_rel = 0.0;
-  double lag_s = 0.0;  ///< Time constant of the filter of a depth sensor or odometry, where it has one.
+  double lag_s = 0.0;                 ///< Time constant of the filter of a depth sensor or odometry, where it has one.
+  double jump_m = 0.0, jump_s = 0.0;  ///< By which a depth sensor reads more from a time on, where it does.
 };
 
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
@@ -42,8 +43,8 @@ struct ReadScale {
 
 /// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of
 /// what is left over, whose neighbours in time are alike, and `sigma_rel`, which all share. Readings far from all
-/// others are rejected; a clock that is up to a second off, and a filter, are found by the residuals. None: the path
-/// moves too little up and down, or the readings do not fit it.
+/// others are rejected; a clock that is up to a second off, a filter, and a jump of the offset are found by the
+/// residuals. None: the path moves too little up and down, or the readings do not fit it.
 [[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
                                                       std::span<const PathStep> path);
 

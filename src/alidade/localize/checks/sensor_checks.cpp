@@ -23,6 +23,11 @@ void add_corrected(const SensorScale& sensor, Verdict& verdict) {
                               "the readings of the " + sensor.sensor + " are filtered, with a time constant of " +
                                   text_of(sensor.lag_s, 2) + " s: corrected; have it read without",
                               sensor.lag_s, 0.0, "s", "path"});
+  if (sensor.jump_m != 0.0)
+    verdict.checks.push_back({sensor.sensor + " jump", State::care,
+                              "the readings of the " + sensor.sensor + " jump by " + text_of(sensor.jump_m, 2) +
+                                  " m at " + text_of(sensor.jump_s) + " s: corrected; was it set to zero, or moved?",
+                              sensor.jump_m, 0.0, "m", "path"});
   if (sensor.offset_m != 0.0)
     verdict.checks.push_back({sensor.sensor + " offset", State::care,
                               "the readings of the " + sensor.sensor + " are " + text_of(std::abs(sensor.offset_m), 2) +

@@ -56,7 +56,7 @@ constexpr double duration_s = 20.0, every_s = 0.1;
 constexpr int num_readings = 190;
 
 struct Drawn {
-  int given = 0, beyond_5_sigma = 0, silent = 0, beyond_3_sigma = 0, clocks = 0, filters = 0;
+  int given = 0, beyond_5_sigma = 0, silent = 0, beyond_3_sigma = 0, clocks = 0, filters = 0, jumps = 0;
   double worst = 0.0, largest_sigma = 0.0;
 
   void add(const std::optional<ReadScale>& read) {
@@ -68,6 +68,7 @@ struct Drawn {
     silent += z > 5.0 && read->late_s == 0.0 && read->lag_s == 0.0 && read->hidden_offset_rel == 0.0;
     clocks += read->late_s != 0.0;
     filters += read->lag_s > 0.0;
+    jumps += read->jump_m != 0.0;
     worst = std::max(worst, z);
     largest_sigma = std::max(largest_sigma, read->sigma_rel);
   }
@@ -170,7 +171,7 @@ TEST(SensorFaults, AClockOfOdometryIsFound) {
 
 // ---- a depth sensor
 
-enum class DepthFault { none, filtered };
+enum class DepthFault { none, filtered, jumping, late, tide, bubbles };
 
 std::vector<DepthReading> depths(const Swaying& swaying, DepthFault fault, std::uint64_t seed) {
   Draws draws(seed + 2000);
@@ -178,12 +179,20 @@ std::vector<DepthReading> depths(const Swaying& swaying, DepthFault fault, std::
   const Eigen::Vector3d down = Eigen::Vector3d(0.2, 0.95, 0.3).normalized();
   const double common = 1.0 + 0.01 * draws.normal(), lag_s = 0.5, fine_s = 0.005;
   double filtered = down.dot(swaying.at(0.0));
+  Draws of_jump(seed + 3000);
+  const int jumps_at = static_cast<int>(num_readings * of_jump.uniform(0.15, 0.85));
+  const double jump_m = (seed % 2 == 0 ? 1.0 : -1.0) * of_jump.uniform(0.05, 1.0);
   for (int i = 0; i < num_readings; ++i) {
     const double t_s = every_s * i;
     for (double s = t_s - every_s; i > 0 && s < t_s - 1e-9; s += fine_s)
       filtered += fine_s / lag_s * (down.dot(swaying.at(s)) - filtered);
     const double depth = fault == DepthFault::filtered ? filtered : down.dot(swaying.at(t_s));
-    readings.push_back({t_s, 7.0 + common * depth + 0.005 * draws.normal(), 0.005});
+    const double offset = fault == DepthFault::jumping && i >= jumps_at ? 7.0 + jump_m : 7.0;
+    const double other = fault == DepthFault::tide                                 ? 0.02 * t_s
+                         : fault == DepthFault::bubbles && of_jump.uniform() < 0.1 ? of_jump.normal()
+                                                                                   : 0.0;
+    const double stamp_s = fault == DepthFault::late ? t_s + 0.3 : t_s;
+    readings.push_back({stamp_s, offset + other + common * depth + 0.005 * draws.normal(), 0.005});
   }
   return readings;
 }
@@ -207,6 +216,21 @@ TEST(SensorFaults, AFilteredDepthIsNoLateClock) {
   const Drawn filtered = drawn_depths(DepthFault::filtered, 40);
   EXPECT_EQ(filtered.silent, 0) << filtered.worst;
   EXPECT_GE(filtered.filters, 30);  // the others are named as a late clock
+}
+
+/// A sensor that is set to zero on the way: the rest of the path lay deeper by the jump, with a filter of 2 s that none
+/// has (scale 0.41 and 0.10 of what it is, at 16 to 20σ). Neither a late clock nor a filter nor a tide is taken for a
+/// jump.
+TEST(SensorFaults, AJumpOfTheDepthIsFoundAndNoOther) {
+  const Drawn jumping = drawn_depths(DepthFault::jumping, 40);
+  EXPECT_EQ(jumping.jumps, 40);
+  EXPECT_EQ(jumping.filters, 0);
+  EXPECT_EQ(jumping.beyond_5_sigma, 0) << jumping.worst;
+  EXPECT_LE(jumping.beyond_3_sigma, 2);
+  EXPECT_LT(jumping.largest_sigma, 0.05);
+  for (const DepthFault fault :
+       {DepthFault::none, DepthFault::filtered, DepthFault::late, DepthFault::tide, DepthFault::bubbles})
+    EXPECT_EQ(drawn_depths(fault, 100).jumps, 0) << static_cast<int>(fault);
 }
 
 // ---- a rangefinder

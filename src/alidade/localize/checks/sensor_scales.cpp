@@ -297,7 +297,9 @@ void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Lo
                read->aside_rad,
                read->hidden_offset_rel,
                read->lag_s,
-               read->scale * acceleration / config.filter.sigma_a_m_s2};
+               read->scale * acceleration / config.filter.sigma_a_m_s2,
+               read->jump_m,
+               read->jump_s};
     scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {
       return !result.path.empty() && reading.t_s >= result.path.front().t_s && reading.t_s <= result.path.back().t_s;
     });

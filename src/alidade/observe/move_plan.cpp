@@ -32,7 +32,7 @@ Verdict moves_verdict(const MovePlan& plan) {
   if (plan.moves.empty()) {
     verdict.state = State::refused;
     verdict.exit_code = ExitCode::undetermined;
-    verdict.sentence = "no move can be proposed: no point was seen";
+    verdict.sentence = "no move can be proposed: this camera sees no point that tells more of it";
     verdict.to_add = "track points first";
     return verdict;
   }

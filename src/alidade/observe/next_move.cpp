@@ -67,7 +67,7 @@ class Planner {
     (void)travel(best->pan_tilt_roll_rad);
     at_ = best->pan_tilt_roll_rad;
     best->sigma_px = stated_sigma_px();
-    return best;
+    return best->sigma_px.allFinite() ? best : std::nullopt;
   }
 
  private:

@@ -141,6 +141,15 @@ TEST(NextMove, PromisesNothingOfRotationsThatAreNotMeasured) {
   EXPECT_THROW((void)plan_moves(now), ConfigError);
 }
 
+TEST(NextMove, PromisesNothingOfACameraThatCannotBe) {
+  SwaysThenMoves head(1);
+  ObservedNow now = observed_now(head.observed());
+  for (const double centre_px : {1e12, 1e300}) {
+    now.k_px[2] = centre_px;
+    EXPECT_EQ(plan_moves(now).verdict.exit_code, ExitCode::undetermined) << centre_px;
+  }
+}
+
 TEST(NextMove, PointsAreWhereTheyAreAtTheEnd) {
   std::vector<ObserveResidual> seen;
   for (int row = 0; row < 40; ++row)

@@ -86,7 +86,8 @@ void add_agreement(const SensorScale& sensor, const SensorScale* first, Verdict&
   verdict.checks.push_back({sensor.sensor, state_of(z, care_z, bad_z),
                             z > care_z ? "the path is " + text_of(100.0 * change, 2) + " % longer by the " +
                                              sensor.sensor + " than by " + by + " (" + text_of(z, 2) + "σ)"
-                                       : "the " + sensor.sensor + " agrees with " + by + " on the scale",
+                                       : "the " + sensor.sensor + " agrees with " + by + " on the scale, within ± " +
+                                             text_of(300.0 * sigma, 2) + " % (3σ)",
                             z, care_z, "σ", "path"});
 }
 

@@ -291,7 +291,8 @@ void try_gain_by_sign(std::span<const ServoSample> log, std::span<const std::siz
   const Eigen::VectorXd misfit = flawed_misfit(log, fit);
   if (!(std::abs(lag_one({misfit.data(), misfit.data() + misfit.size()})) > max_correlation)) return;
   const LinearFit start = searched(log, fit.kind, true);
-  if (!(std::abs(start.difference) < 1.0)) return;
+  const auto rows = static_cast<double>(readings_of(thinned(log)).size());
+  if (!(std::abs(start.difference) < 1.0) || start.sum2 > rows * fit.rms_rad * fit.rms_rad) return;
   ServoFit trial = fit;
   trial.params = start.params;
   trial.flaws = {.gain_difference = start.difference};

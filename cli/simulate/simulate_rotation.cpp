@@ -30,7 +30,7 @@ struct SimulateRotationArgs {
   std::string size = "780x582", source = "rate", motion = "sway", zoom = "none";
   std::vector<double> k{710.0, 700.0, 390.0, 290.0}, lever, depth;
   double k1 = 0.0, k2 = 0.0, k3 = 0.0, p1 = 0.0, p2 = 0.0, tilt_deg = 0.0, delay_s = 0.0, shutter_s = 0.0,
-         clock_rate = 0.0;
+         clock_rate = 0.0, axes_skew_deg = 0.0;
   double drift_per_s = 0.0, backlash_deg = 0.0;
   std::vector<double> mount_deg, bias, signs, zero_drift, curve_deg;
   RotationFaults faults;
@@ -214,6 +214,7 @@ RotationScene scene_of(const SimulateRotationArgs& args, std::uint64_t seed) {
   scene.motion = motion_of(args);
   scene.delay_s = args.delay_s;
   scene.clock_rate = args.clock_rate;
+  scene.axes_skew_rad = args.axes_skew_deg * std::numbers::pi / 180.0;
   scene.shutter_s = args.shutter_s;
   if (!args.mount_deg.empty()) scene.mount_rad = Eigen::Vector3d(args.mount_deg.data()) * std::numbers::pi / 180.0;
   if (!args.lever.empty()) scene.lever_arm_m = Eigen::Vector3d(args.lever.data());
@@ -263,6 +264,9 @@ void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
   add_number(command, "--encoder-scale", faults.angle_scale, "Angles as measured over the true ones", 0.1, 10.0);
   add_number(command, "--backlash-deg", args.backlash_deg, "Play between the encoders and the camera [°]", 0.0, 10.0);
   numbers("--curve-deg", args.curve_deg, 2, "Amplitudes of the encoders' error once and twice a turn [°]");
+  add_number(command, "--axes-skew-deg", args.axes_skew_deg,
+             "Of a head: the tilt axis is rotated by it about the view, from where it is perpendicular to the pan axis",
+             -10.0, 10.0);
   numbers("--zero-drift", args.zero_drift, 2, "Of the zeros of pan, tilt [rad/s]");
   numbers("--signs", args.signs, 2, "1 or -1: how pan and tilt count");
   command.add_flag("--swap-axes", faults.swaps_axes, "Pan and tilt are exchanged");

@@ -39,8 +39,9 @@ FieldList word_fields(ObserveConfig& config) {
        .help = "known: exact; noisy: measured with --sigma-angle or --sigma-rate; free"},
       {.name = "estimate",
        .value = &config.estimate,
-       .help = "Estimated as well: auto (default: what the residuals indicate), none, or of k1, k2, k3, p1, p2, mount, "
-               "delay, lever, shutter, focal-drift, and of the rotation scale, backlash, curve, drift, bias, clock"},
+       .help =
+           "Estimated as well: auto (default: what the residuals indicate), none, or of k1, k2, k3, p1, p2, mount, "
+           "delay, lever, shutter, focal-drift, and of the rotation scale, backlash, curve, axes, drift, bias, clock"},
       {.name = "start",
        .value = vector_code<4>(config.start),
        .help = "Initial guess: fx,fy,cx,cy [px]; without it several are tried",

@@ -32,9 +32,8 @@ struct ObserveConfig {
   ObserveMethod method = ObserveMethod::hybrid;
   RotationKnowledge rotation = RotationKnowledge::known;  ///< Of logs; photos and matches have no measured rotation.
   /// What is estimated beside fx, fy, cx, cy, by words: auto (what the residuals indicate), none, or of k1, k2, k3, p1,
-  /// p2, mount, delay, lever, shutter, focal-drift, and of the measured rotation scale, backlash, curve, drift, bias,
-  /// clock (its rate against the images').
-  /// Empty: auto of methods that can, else none.
+  /// p2, mount, delay, lever, shutter, focal-drift, and of the measured rotation scale, backlash, curve, axes, drift,
+  /// bias, clock (its rate against the images'). Empty: auto of methods that can, else none.
   std::vector<std::string> estimate = {};
   /// An initial guess, and the lens: pixels are undistorted by it where no distortion is estimated.
   std::optional<Camera> camera = {};

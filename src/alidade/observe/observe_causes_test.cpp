@@ -161,6 +161,14 @@ TEST(ObserveCauses, BacklashIsEstimated) {
   expect_estimated(with_faults({.backlash_rad = 0.1 * degree}), "backlash_pan_rad");
 }
 
+TEST(ObserveCauses, AxesThatAreNotPerpendicularAreEstimated) {
+  for (const double skew_rad : {0.5 * degree, -0.2 * degree}) {
+    expect_estimated(
+        with_scene([=](RotationScene& scene, RotationLogConfig&, Draws&) { scene.axes_skew_rad = skew_rad; }),
+        "axes_skew_rad");
+  }
+}
+
 TEST(ObserveCauses, BiasOfAGyroscopeIsEstimated) {
   World world = with_scene([](RotationScene&, RotationLogConfig& config, Draws& draws) {
     config.rate_bias_rad_per_s = 0.005 * draws.normal3();

@@ -7,7 +7,8 @@
 
 namespace alidade {
 
-inline constexpr int max_rotation_errors = 15;  ///< Of a head: scale, backlash, zero and curve of both axes, clock.
+/// Of a head: scale, backlash, zero and curve of both axes, the angle between these, clock.
+inline constexpr int max_rotation_errors = 16;
 using TurnByErrors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_rotation_errors>;
 
 /// One instant as the estimators of a rotating camera take it: how the camera has rotated since the start, and what it

@@ -22,7 +22,7 @@ void take_word(const std::string& word, ObserveSetup& setup, Faults& faults) {
   } else {
     faults.push_back("--estimate: '" + word +
                      "' is not auto, none, k1, k2, k3, p1, p2, mount, delay, lever, shutter, focal-drift, scale, "
-                     "backlash, curve, drift, bias or clock");
+                     "backlash, curve, axes, drift, bias or clock");
   }
 }
 

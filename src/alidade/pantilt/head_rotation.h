@@ -14,6 +14,15 @@ namespace alidade {
          exp_so3({0.0, 0.0, pan_tilt_roll_rad.z()});
 }
 
+/// The same of a head whose tilt axis is rotated by so much about the view, from where it would be perpendicular to the
+/// pan axis.
+[[nodiscard]] inline Eigen::Quaterniond base_from_cam_rotation(const Eigen::Vector3d& pan_tilt_roll_rad,
+                                                               double axes_skew_rad) {
+  const Eigen::Vector3d tilt_axis(std::cos(axes_skew_rad), std::sin(axes_skew_rad), 0.0);
+  return exp_so3({0.0, -pan_tilt_roll_rad.x(), 0.0}) * exp_so3(pan_tilt_roll_rad.y() * tilt_axis) *
+         exp_so3({0.0, 0.0, pan_tilt_roll_rad.z()});
+}
+
 /// Angular rate in the camera frame of a head that rotates with these rates: without roll
 /// (τ̇, −α̇ cos τ, α̇ sin τ), so that ω_z is zero at zero tilt alone.
 [[nodiscard]] inline Eigen::Vector3d head_rate_in_cam(const Eigen::Vector3d& pan_tilt_roll_rad,

@@ -15,13 +15,15 @@ class TrueRotation {
 
   /// mount_from_start at t ≥ 0 (and, for a small negative t, extrapolated).
   Eigen::Quaterniond at(double t_s) {
-    if (!is_rate_)
-      return base_from_cam_rotation(scene_.motion(t_s)).conjugate() * base_from_cam_rotation(scene_.motion(0.0));
+    if (!is_rate_) return base_from_cam(t_s).conjugate() * base_from_cam(0.0);
     while (t_s_ + step_s_ <= t_s) advance(step_s_);
     return exp_so3(-scene_.motion(0.5 * (t_s_ + t_s)) * (t_s - t_s_)) * mount_from_start_;
   }
 
  private:
+  [[nodiscard]] Eigen::Quaterniond base_from_cam(double t_s) const {
+    return base_from_cam_rotation(scene_.motion(t_s), scene_.axes_skew_rad);
+  }
   void advance(double h) {
     mount_from_start_ = (exp_so3(-scene_.motion(t_s_ + 0.5 * h) * h) * mount_from_start_).normalized();
     t_s_ += h;

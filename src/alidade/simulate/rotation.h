@@ -26,6 +26,7 @@ struct RotationScene {
   Eigen::Vector3d lever_arm_m = Eigen::Vector3d::Zero();  ///< Camera centre from the centre of rotation, camera frame.
   Eigen::Vector3d mount_rad =
       Eigen::Vector3d::Zero();  ///< cam_from_mount = Exp(mount): what is measured is the mount's.
+  double axes_skew_rad = 0.0;   ///< Of a head's tilt axis, about the view: base_from_cam_rotation().
   double delay_s = 0.0;         ///< Pixels are of t + delay.
   double clock_rate = 0.0;  ///< The images' clock over the rotation's, less one: pixels are of t · (1 + it) + delay.
   double shutter_s = 0.0;   ///< The last row is read so much after the first; the central one at t + delay.

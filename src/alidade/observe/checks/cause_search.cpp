@@ -18,7 +18,8 @@ struct Trial {
 
 const std::string scale_cause = "encoder scale", backlash_cause = "backlash", zero_cause = "zero that drifts",
                   rate_scale_cause = "scale of the rates", bias_cause = "bias of the rates",
-                  attitude_cause = "attitude that drifts", clock_cause = "clock rate";
+                  attitude_cause = "attitude that drifts", clock_cause = "clock rate",
+                  axes_cause = "axes that are not perpendicular";
 
 /// Simple ones first: of those that explain about as well the first is taken.
 const std::vector<Trial>& trials() {
@@ -31,6 +32,8 @@ const std::vector<Trial>& trials() {
       {.errors = {backlash_cause}},
       {.errors = {scale_cause, rate_scale_cause}},
       {.errors = {bias_cause, attitude_cause, zero_cause}},
+      {.errors = {axes_cause}},
+      {.mount = true, .errors = {axes_cause}},
       {.mount = true, .delay = true},
       {.lever = true},
       {.delay = true, .errors = {clock_cause}},

@@ -25,6 +25,7 @@ constexpr std::pair<const char*, const char*> cause_words[] = {{"scale", "encode
                                                                {"scale", "scale of the rates"},
                                                                {"backlash", "backlash"},
                                                                {"curve", "error of the angles within a turn"},
+                                                               {"axes", "axes that are not perpendicular"},
                                                                {"drift", "zero that drifts"},
                                                                {"drift", "attitude that drifts"},
                                                                {"bias", "bias of the rates"},

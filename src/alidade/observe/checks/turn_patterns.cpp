@@ -5,13 +5,15 @@
 
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
+#include "alidade/pantilt/head_rotation.h"
 
 namespace alidade {
 namespace {
 
 // σ of what ordinary instruments have. Encoders: cheap servos; rates: gyroscopes of phones.
 constexpr double instrument_scale = 0.02, instrument_backlash_rad = 0.5 * degree, instrument_curve_rad = 0.3 * degree,
-                 instrument_zero_drift = 1e-3, instrument_bias = 0.01, instrument_clock_rate = 1e-3;
+                 instrument_zero_drift = 1e-3, instrument_bias = 0.01, instrument_clock_rate = 1e-3,
+                 instrument_skew_rad = 0.2 * degree;
 
 using Rows = std::span<RotationRow>;
 
@@ -105,7 +107,26 @@ std::string with_axis(const char* name, const char* axis, const char* unit) {
   return std::string(name) + "_" + axis + (*unit == '\0' ? "" : "_") + unit;
 }
 
+/// Pan, tilt and roll of a head with perpendicular axes that looks the same way. See base_from_cam_rotation().
+Eigen::Vector3d pan_tilt_roll_of(const Eigen::Matrix3d& base_from_cam) {
+  const Eigen::Vector3d view = base_from_cam.col(2);
+  const double pan = std::atan2(-view.x(), view.z()), tilt = std::asin(std::clamp(-view.y(), -1.0, 1.0));
+  const Eigen::Matrix3d rolled =
+      base_from_cam_rotation({pan, tilt, 0.0}).toRotationMatrix().transpose() * base_from_cam;
+  return {pan, tilt, std::atan2(rolled(1, 0), rolled(0, 0))};
+}
+
+/// The tilt axis is rotated by so much about the view, from where it would be perpendicular to the pan axis.
+void undo_skew(Rows rows, double amount) {
+  for (RotationRow& row : rows) {
+    Eigen::Vector3d& angles = row.pan_tilt_roll_rad;
+    if (angles.allFinite()) angles = pan_tilt_roll_of(base_from_cam_rotation(angles, amount).toRotationMatrix());
+  }
+}
+
 void add_head_errors(std::vector<RotationError>& errors) {
+  errors.push_back(
+      {"axes that are not perpendicular", "tilt axis", "rad", "axes_skew_rad", instrument_skew_rad, 1e-6, undo_skew});
   static constexpr const char* axes[] = {"pan", "tilt"};
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const char* name = axes[axis];

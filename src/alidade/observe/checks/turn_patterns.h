@@ -23,8 +23,8 @@ struct RotationError {
 };
 
 /// Of heads: the angle between the axes, scale of each axis, backlash (the camera lags behind the encoder by half of
-/// it), a zero that drifts, an error once and twice a turn. Of rates: scale and bias of each axis. Of attitudes: a drift
-/// about each axis. Of all: a clock that goes at another rate than the images'.
+/// it), a zero that drifts, an error once and twice a turn. Of rates: scale and bias of each axis. Of attitudes: a
+/// drift about each axis. Of all: a clock that goes at another rate than the images'.
 [[nodiscard]] std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_rate);
 
 /// By how much each row's rotation changes, per unit of it.

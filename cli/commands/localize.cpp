@@ -2,10 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <iostream>
 #include <memory>
 #include <opencv2/core.hpp>
-#include <set>
 
 #include "alidade/detect/image_sequence.h"
 #include "alidade/formats/beam_file.h"
@@ -17,13 +15,11 @@
 #include "alidade/results/localize_outcome.h"
 #include "alidade/results/seen_frames.h"
 #include "alidade/tables/localize_file.h"
-#include "alidade/tables/logs/observations_stream.h"
 #include "alidade/tables/map_file.h"
 #include "cli/app/app.h"
 #include "cli/app/live.h"
-#include "cli/app/standard_input.h"
-#include "cli/app/terminal.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/localize_live.h"
 
 namespace alidade::cli {
 namespace {
@@ -32,7 +28,7 @@ struct LocalizeArgs {
   std::filesystem::path sequence;
   std::string camera, target, start, truth, depth_sensor, range, beam, odometry, imu, imu_mounting, mask, map;  // files
   Imu imu_values;  ///< Of what `imu` reads.
-  std::optional<double> rate_hz;
+  std::optional<double> rate_hz, wait_s;
   bool skip_bad = false;
   std::vector<SkippedInput> skipped;  ///< Of the sensors' files.
   LocalizeConfig config;
@@ -162,6 +158,11 @@ FieldList fields_of(LocalizeArgs& args) {
        .help = "Frames per second: times are frame numbers over this",
        .limits = {.min = 0.0, .is_above_min = true}},
   });
+  append({{.name = "wait_s",
+           .value = &args.wait_s,
+           .help = "Images of a folder that another program still writes: so many seconds without a new one end it; "
+                   "poses are printed as they come",
+           .limits = {.min = 0.0, .is_above_min = true}}});
   append(alidade::fields_of(args.config));
   append(fields_of(args.imu_values));
   fields.push_back(
@@ -202,6 +203,7 @@ void read_values(LocalizeArgs& args) {
     if (!args.imu_mounting.empty()) args.config.imu->mounting = read_imu_mounting(args.imu_mounting);
   }
   if (!args.range.empty()) args.config.range_readings = read_ranges(args.range, args.skip_bad, &args.skipped);
+  if (args.wait_s && !args.is_images()) throw UsageError("--wait needs a folder of images; it may still be empty");
   if (!args.mask.empty() && !args.is_images())
     throw UsageError("--mask is of images; a table of observations has none");
   args.config.masks_circle = args.mask == "circle";
@@ -248,67 +250,6 @@ ObservationsOptions reading(const LocalizeArgs& args, const Camera& camera) {
   return {args.skip_bad, args.rate_hz.value_or(0.0), camera.width_px, camera.height_px};
 }
 
-/// What there is to say of rows that a user has already read: on stderr, and to those who watch.
-class RowsVerdict {
- public:
-  RowsVerdict(const LocalizeArgs& args, live::Server* server) : server_(server) {
-    const bool is_up_to_scale = args.target.empty() && args.map.empty() && args.start.empty();
-    if (is_up_to_scale) say(0.0, "rows are up to scale, in the first camera's frame: metres, if any, at the end");
-  }
-
-  /// Each kind of thing once: rows of a wrong lens stay off where they fit each other again.
-  void take(const Verdict& recent, const ObservationFrame& last) {
-    std::string texts;
-    const auto add = [&](const std::string& name, const std::string& text) {
-      if (said_.insert(name).second) texts += (texts.empty() ? "" : "; ") + text;
-    };
-    if (recent.checks.empty()) add("none", recent.sentence);
-    for (const Check& check : recent.checks)
-      if (check.state != State::good) add(check.name, check.text);
-    if (!texts.empty())
-      say(last.t_s, "rows to frame " + std::to_string(last.frame) + ", by the filter alone: " + texts);
-  }
-
- private:
-  void say(double t_s, const std::string& line) const {
-    tell_person("alidade: " + line);
-    const auto t_ns = static_cast<std::int64_t>(t_s * 1e9);
-    if (server_ != nullptr)
-      server_->send("/log", t_ns,
-                    [t_ns, line] { return live::log_text(t_ns, live::LogLevel::warning, "localize", line); });
-  }
-
-  live::Server* server_;
-  std::set<std::string> said_;  ///< Names of checks.
-};
-
-/// Rows from standard input as they come, each frame answered as soon as it is complete with a row of poses.csv.
-Localization localize_input(const LocalizeArgs& args, const Camera& camera, std::span<const TimedPose> truth,
-                            live::Server* server, Run& run) {
-  constexpr std::size_t vague = 100, judged_every = 300;  // frames; depths are while they are few
-  StandardInput input;                                    // Ctrl-C ends waiting for a row
-  ObservationsStream frames(input, "-", reading(args, camera));
-  Localizer localizer(camera, args.config);
-  const bool shows = !run.options.json && !run.options.quiet;
-  const std::string header = poses_csv({});
-  if (shows) std::cout << header << std::flush;
-  RowsVerdict said(args, server);
-  std::size_t count = 0;
-  while (const std::optional<ObservationFrame> frame = frames.next()) {
-    report_progress(run.progress, "frames", ++count, 0);
-    const PathStep& step = localizer.push(*frame);
-    if (shows) std::cout << poses_csv({&step, 1}).substr(header.size()) << std::flush;
-    if (count == vague) static_cast<void>(localizer.recent());
-    if (count % judged_every == 0) said.take(localizer.recent(), *frame);
-  }
-  report_progress(run.progress, "frames", count, 0);  // the input may have ended by Ctrl-C
-  run.lap("read");
-  Localization result = localizer.finish(truth);
-  result.counts.given += frames.skipped().size();
-  result.counts.skipped = frames.skipped();
-  return result;
-}
-
 Localization localize_table(const LocalizeArgs& args, const Camera& camera, std::span<const TimedPose> truth,
                             LiveRun& live, Run& run) {
   const ObservationTable observations = read_observations(args.sequence, reading(args, camera));
@@ -316,16 +257,20 @@ Localization localize_table(const LocalizeArgs& args, const Camera& camera, std:
   return alidade::localize(observations, camera, args.config, truth, live.progress());
 }
 
-Localization localize_images(LocalizeArgs args, const Camera& camera, std::span<const TimedPose> truth, LiveRun& live,
-                             std::optional<SeenFrames>& seen, Run& run) {
-  const ImageStream images = images_in(args.sequence, camera, args.rate_hz.value_or(0.0));
+Localization localize_images(LocalizeArgs args, const FrameByFrame& given, std::optional<SeenFrames>& seen) {
+  const double rate_hz = args.rate_hz.value_or(0.0);
+  ImageStream images;
+  if (!args.wait_s) images = images_in(args.sequence, given.camera, rate_hz);
   live::RateLimit limit(10.0);
-  seen.emplace(images.num_images, !run.options.no_report);
+  seen.emplace(images.num_images, !given.run.options.no_report);
   args.config.watch_image = [&](double t_s, const cv::Mat& image, std::span<const ObservationTried> tried) {
     seen->offer(t_s, image, tried);
-    if (live.server() != nullptr && limit.lets_through(now_s())) show_image(*live.server(), t_s, image, tried);
+    if (given.server != nullptr && limit.lets_through(now_s())) show_image(*given.server, t_s, image, tried);
   };
-  return alidade::localize(images, camera, args.config, truth, live.progress());
+  if (!args.wait_s) return alidade::localize(images, given.camera, args.config, given.truth, given.progress);
+  const FrameByFrame watched{given.camera, args.config,    given.truth, given.is_up_to_scale,
+                             given.server, given.progress, given.run};
+  return localize_growing(args.sequence, rate_hz, *args.wait_s, watched);
 }
 
 ExitCode run_localize(LocalizeArgs args, Run& run) {
@@ -345,8 +290,11 @@ ExitCode run_localize(LocalizeArgs args, Run& run) {
     };
   }
   std::optional<SeenFrames> seen;
-  const Localization result = args.is_input()    ? localize_input(args, camera, truth, live.server(), run)
-                              : args.is_images() ? localize_images(args, camera, truth, live, seen, run)
+  const bool is_up_to_scale = args.target.empty() && args.map.empty() && args.start.empty();
+  const Progress progress = args.is_input() ? run.progress : live.progress();
+  const FrameByFrame given{camera, args.config, truth, is_up_to_scale, live.server(), progress, run};
+  const Localization result = args.is_input()    ? localize_input(reading(args, camera), given)
+                              : args.is_images() ? localize_images(args, given, seen)
                                                  : localize_table(args, camera, truth, live, run);
   if (live.server() != nullptr && !result.path.empty()) stream.show(*live.server(), result.path.back(), true);
   run.lap("localize");
@@ -368,6 +316,7 @@ void add_localize(App& app) {
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml --calibrate-online\n"
                    "  tracker | alidade localize - --camera camera.yaml --target target.yaml\n"
+                   "  recorder frames/ & alidade localize frames/ --camera camera.yaml --rate 30 --wait 5\n"
                    "alidade localize later/ --camera camera.yaml --map alidade-out/localize/map.yaml --rate 30\n"
                    "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"
                    "alidade localize sights.csv --camera camera.yaml --depth-sensor depth.csv\n"

@@ -1,10 +1,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <thread>
 
 #include "alidade/files/files.h"
 #include "alidade/testing/command_test.h"
@@ -129,6 +132,55 @@ TEST_F(LocalizeImageFolders, GapsAndBlackImagesAreCounted) {
   EXPECT_EQ(document["estimate"]["lost"], 2);
   EXPECT_EQ(document["verdict"]["state"], "care");
   EXPECT_LT(document["estimate"]["ate_m"], 0.01);
+}
+
+/// Images that are written while the command runs, each in two halves, give what the whole folder gives.
+TEST_F(LocalizeImageFolders, AFolderThatFillsGivesWhatItGivesWhenFull) {
+  const std::vector<std::string> words{"--camera", path("sim/camera.yaml"), "--target",   path("sim/target.yaml"),
+                                       "--truth",  path("sim/truth.tum"),   "--no-report"};
+  const Outcome full = alidade({"localize", path("sim/frames"), "--rate", "30", "--out", path("full")}, words);
+  ASSERT_EQ(full.code, 0) << full.err;
+  fs::create_directories(path("fills"));
+  std::vector<std::string> command{ALIDADE_EXECUTABLE, "localize", path("fills"), "--rate",      "30",
+                                   "--wait",           "3",        "--out",       path("filled")};
+  command.insert(command.end(), words.begin(), words.end());
+  const auto fill = [&](pid_t) {
+    const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(60)); };
+    pause();
+    for (int i = 0; i < num_frames; ++i) {
+      const std::string bytes = read_file(frame(i));
+      std::ofstream file(path(fmt::format("fills/{:06}.png", i)), std::ios::binary);
+      file << bytes.substr(0, bytes.size() / 2) << std::flush;
+      pause();
+      file << bytes.substr(bytes.size() / 2) << std::flush;
+    }
+  };
+  const Outcome filled = testing::run_program(command, "", fill);
+  ASSERT_EQ(filled.code, 0) << filled.err;
+  EXPECT_EQ(Json::parse(read_file(path("filled/result.json")))["estimate"].dump(),
+            Json::parse(read_file(path("full/result.json")))["estimate"].dump());
+  for (const char* file : {"trajectory.tum", "poses.csv", "map.csv"})
+    EXPECT_EQ(read_file(path(std::string("filled/") + file)), read_file(path(std::string("full/") + file))) << file;
+  const std::string poses = read_file(path("full/poses.csv"));  // its header, and so many rows
+  EXPECT_EQ(filled.out.substr(0, poses.find('\n')), poses.substr(0, poses.find('\n')));
+  EXPECT_GT(std::ranges::count(filled.out, '\n'), std::ranges::count(poses, '\n'));
+}
+
+TEST_F(LocalizeImageFolders, WaitsForNothingElse) {
+  fs::create_directories(path("empty"));
+  expect_refused("empty", {"--rate", "30", "--wait", "0.1"}, 3, "the folder holds no photos");
+  expect_refused("empty", {"--rate", "30", "--wait", "0"}, 2, "--wait");
+  expect_refused("sim/truth.tum", {"--rate", "30", "--wait", "0.1"}, 2, "--wait needs a folder of images");
+  fs::rename(path("sim/frames"), path("empty/data"));
+  write_file(path("empty/data.csv"), "#timestamp [ns],filename\n0,000000.png\n");
+  expect_refused("empty", {"--wait", "0.1"}, 3, "only a folder of numbered images can be waited for");
+  fs::create_directories(path("silent"));
+  const Outcome stopped =
+      testing::run_program({ALIDADE_EXECUTABLE, "localize", path("silent"), "--camera", path("sim/camera.yaml"),
+                            "--rate", "30", "--wait", "600", "--out", path("out")},
+                           "", testing::interrupt_after(std::chrono::milliseconds(200)));
+  EXPECT_EQ(stopped.code, 130) << stopped.err;
+  EXPECT_FALSE(fs::exists(path("out/trajectory.tum")));
 }
 
 }  // namespace

@@ -119,7 +119,7 @@ Board board_of(const std::vector<KnownPoint>& points) {
 /// Images one after the other, with their times.
 class ImageSequence {
  public:
-  ImageSequence(const path& given, double rate_hz, int width_px, int height_px);
+  ImageSequence(const path& given, double rate_hz, int width_px, int height_px, const MoreImages& more);
   [[nodiscard]] bool next(cv::Mat& grey, long& frame, double& t_s);
   [[nodiscard]] std::size_t num_images() const { return frames_.num_frames(); }
 
@@ -131,9 +131,14 @@ class ImageSequence {
   std::size_t count_ = 0;
 };
 
-ImageSequence::ImageSequence(const path& given, double rate_hz, int width_px, int height_px)
-    : frames_(images_of(given)), rate_hz_(rate_hz), width_px_(width_px), height_px_(height_px) {
+ImageSequence::ImageSequence(const path& given, double rate_hz, int width_px, int height_px, const MoreImages& more)
+    : frames_(images_of(given), FrameColour::grey, more),
+      rate_hz_(rate_hz),
+      width_px_(width_px),
+      height_px_(height_px) {
   const AslFolder asl = asl_folder(given);
+  if (more && !asl.table.empty())
+    throw InputError(given.string() + ": only a folder of numbered images can be waited for, not one with data.csv");
   if (!asl.table.empty())
     times_s_ = asl_times_s(asl.table, asl.images);
   else if (!(rate_hz > 0.0))
@@ -172,8 +177,8 @@ std::int64_t origin_ns_of(const path& given) {
   return table.times_ns.empty() ? 0 : table.times_ns.front();
 }
 
-ImageStream images_in(const path& given, const Camera& camera, double rate_hz) {
-  const auto images = std::make_shared<ImageSequence>(given, rate_hz, camera.width_px, camera.height_px);
+ImageStream images_in(const path& given, const Camera& camera, double rate_hz, const std::function<bool()>& more) {
+  const auto images = std::make_shared<ImageSequence>(given, rate_hz, camera.width_px, camera.height_px, more);
   const auto next = [images](cv::Mat& grey, long& frame, double& t_s) { return images->next(grey, frame, t_s); };
   return {next, images->num_images()};
 }

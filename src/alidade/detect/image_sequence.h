@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 
 #include "alidade/camera/camera.h"
 #include "alidade/localize/sequence.h"
@@ -19,7 +20,12 @@ ALIDADE_PUBLIC_BEGIN
 /// frame is its number over this, the first at 0; not needed where data.csv has times. Throws InputError: no such
 /// thing, no images, no times, times that run backwards, an image that data.csv does not name; and when it comes to it,
 /// what is no image, or not of that size. Copies share how far they are.
-[[nodiscard]] ImageStream images_in(const std::filesystem::path& path, const Camera& camera, double rate_hz = 0.0);
+/// With `more` the folder of numbered images may still be filled by another program, in order, and be empty at first:
+/// `more` is asked where there is no further image, or the newest one is not yet whole; true, after a while: look
+/// again; false: that was all. How many there will be is then not known. Throws InputError also for a video or EuRoC's
+/// layout, and for an image that comes after a later one.
+[[nodiscard]] ImageStream images_in(const std::filesystem::path& path, const Camera& camera, double rate_hz = 0.0,
+                                    const std::function<bool()>& more = {});
 
 /// The time [ns] that is zero in such a folder of EuRoC's layout, the first in its data.csv: of other files of the same
 /// recording, as imu0/data.csv, this has to be subtracted. 0 for any other sequence. Throws InputError.

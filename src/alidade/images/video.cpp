@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <vector>
 
+#include "alidade/description/natural_order.h"
 #include "alidade/files/files.h"
 #include "alidade/images/photos.h"
 #include "alidade/images/video_process.h"
@@ -53,10 +55,14 @@ cv::Mat in_colours(const cv::Mat& photo, FrameColour colour) {
 
 class VideoFrames::Impl {
  public:
-  Impl(const std::filesystem::path& path, FrameColour colour) : name(path.string()), colour_(colour) {
+  Impl(const std::filesystem::path& path, FrameColour colour, MoreImages more)
+      : name(path.string()), colour_(colour), more_(std::move(more)) {
     std::error_code error;
     if (!std::filesystem::exists(path, error)) throw InputError(name + ": no such file or folder");
-    if (std::filesystem::is_directory(path, error)) {
+    const bool is_folder = std::filesystem::is_directory(path, error);
+    if (more_) {
+      if (!is_folder) throw InputError(name + ": only a folder of numbered images can be waited for");
+    } else if (is_folder) {
       images_ = list_photos({path});
       numbers_ = numbers_of(images_);
       num_frames = images_.size();
@@ -67,7 +73,7 @@ class VideoFrames::Impl {
   }
 
   cv::Mat next() {
-    cv::Mat frame = process_ ? decoded() : read();
+    cv::Mat frame = process_ ? decoded() : more_ ? awaited() : read();
     if (frame.empty()) return frame;
     const std::string where = process_ ? name : images_[count_].string();
     if (size_.empty()) size_ = frame.size();
@@ -91,6 +97,52 @@ class VideoFrames::Impl {
     if (bytes.empty()) return {};
     const int type = colour_ == FrameColour::bgr ? CV_8UC3 : CV_8UC1;
     return cv::Mat(process_->height_px(), process_->width_px(), type, bytes.data()).clone();
+  }
+
+  /// The next image of a folder that may still be filled, as soon as it is whole.
+  cv::Mat awaited() {
+    while (true) {
+      if (count_ == images_.size() && !look_again()) {
+        if (more_()) continue;
+        if (count_ == 0) images_ = list_photos({name});  // says what lies there instead
+        return {};
+      }
+      const bool was_newest = count_ + 1 == images_.size();
+      try {
+        return read();
+      } catch (const InputError&) {
+        // Whole when the next one is there; and that was perhaps written since.
+        if (!was_newest || (!look_again() && !more_())) throw;
+      }
+    }
+  }
+
+  /// Lists the folder; whether it has images that were not listed.
+  bool look_again() {
+    std::vector<std::filesystem::path> there;
+    try {
+      there = list_photos({name});
+    } catch (const InputError&) {
+      return false;  // none, or not now
+    }
+    const auto next = images_.begin() + static_cast<std::ptrdiff_t>(count_);
+    const std::vector<std::filesystem::path> given(images_.begin(), next);
+    std::vector<std::filesystem::path> listed = given;
+    for (const std::filesystem::path& image : there) {
+      if (given.empty() || natural_less(given.back().string(), image.string()))
+        listed.push_back(image);
+      else if (std::ranges::find(given, image) == given.end())
+        throw InputError(fmt::format("{}: came after {}; images must come in order", image.string(),
+                                     given.back().filename().string()));
+    }
+    const bool has_new = listed.size() > images_.size();
+    const std::vector<std::size_t> numbers = numbers_of(listed);
+    if (!given.empty() && numbers[count_ - 1] != number)
+      throw InputError(fmt::format("{}: has images without a number of their own behind {}, which had one", name,
+                                   given.back().filename().string()));
+    images_ = std::move(listed);
+    numbers_ = numbers;
+    return has_new;
   }
 
   cv::Mat read() {
@@ -120,6 +172,7 @@ class VideoFrames::Impl {
   }
 
   FrameColour colour_;
+  MoreImages more_;
   std::vector<std::filesystem::path> images_;
   std::vector<std::size_t> numbers_;
   std::optional<VideoProcess> process_;
@@ -128,8 +181,8 @@ class VideoFrames::Impl {
   double full_scale_ = 255.0;
 };
 
-VideoFrames::VideoFrames(const std::filesystem::path& file_or_folder, FrameColour colour)
-    : impl_(std::make_unique<Impl>(file_or_folder, colour)) {}
+VideoFrames::VideoFrames(const std::filesystem::path& file_or_folder, FrameColour colour, MoreImages more)
+    : impl_(std::make_unique<Impl>(file_or_folder, colour, std::move(more))) {}
 VideoFrames::VideoFrames(VideoFrames&&) noexcept = default;
 VideoFrames& VideoFrames::operator=(VideoFrames&&) noexcept = default;
 VideoFrames::~VideoFrames() = default;

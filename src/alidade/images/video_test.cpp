@@ -105,6 +105,114 @@ TEST(VideoFrames, OfAFileAreDecoded) {
   EXPECT_TRUE(video.next().empty());
 }
 
+/// A folder that fills: each time that more is asked for, the next of these happens; then that was all.
+class FillingFolder {
+ public:
+  explicit FillingFolder(std::vector<std::function<void()>> steps) : steps_(std::move(steps)) {}
+  [[nodiscard]] MoreImages more() {
+    return [this] {
+      if (num_asked_ == steps_.size()) return false;
+      steps_[num_asked_++]();
+      return true;
+    };
+  }
+  [[nodiscard]] std::size_t num_asked() const { return num_asked_; }
+
+ private:
+  std::vector<std::function<void()>> steps_;
+  std::size_t num_asked_ = 0;
+};
+
+/// The first so many percent of an image's file; at 100 all of it.
+void write_part(const std::filesystem::path& file, int value, int percent) {
+  cv::Mat image = plain(value);
+  for (int i = 0; i < image.rows; ++i) image.at<unsigned char>(i, i) = static_cast<unsigned char>(37 * i);
+  write_image(file, image);
+  const std::string bytes = read_file(file);
+  write_file(file, bytes.substr(0, bytes.size() * static_cast<std::size_t>(percent) / 100));
+}
+
+TEST(VideoFrames, OfAFolderThatFillsComeWhenTheyAreWhole) {
+  for (const char* ending : {".png", ".jpg", ".bmp", ".pgm", ".tif", ".webp"}) {
+    const TemporaryFolder folder;
+    const auto image = [&](int number) { return folder.path() / (std::to_string(number) + ending); };
+    FillingFolder filling({[] {}, [&] { write_part(image(8), 80, 0); }, [&] { write_part(image(8), 80, 50); },
+                           [&] { write_part(image(8), 80, 97); }, [&] { write_part(image(8), 80, 100); }, [] {},
+                           [&] {
+                             write_part(image(9), 90, 100);
+                             write_part(image(11), 110, 50);  // 10 is missing, 11 not yet whole
+                           },
+                           [&] { write_part(image(11), 110, 100); }, [] {}});
+    VideoFrames video(folder.path(), FrameColour::grey, filling.more());
+    EXPECT_EQ(video.num_frames(), 0u);
+    const std::vector<std::size_t> asked{5, 7, 8};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const cv::Mat frame = video.next();
+      const std::size_t number = i == 2 ? 11 : 8 + i;
+      ASSERT_EQ(frame.size(), cv::Size(96, 80)) << ending;
+      EXPECT_NEAR(frame.at<unsigned char>(79, 0), 10.0 * static_cast<double>(number), 2.0) << ending;
+      EXPECT_EQ(video.number(), number - 8) << ending;
+      EXPECT_EQ(filling.num_asked(), asked[i]) << ending;
+    }
+    EXPECT_TRUE(video.next().empty());
+    EXPECT_EQ(filling.num_asked(), 9u);
+  }
+}
+
+/// What is refused of a folder in which there is 5.png, and then this happens.
+std::string refusal_after(const std::function<void(const std::filesystem::path&)>& step) {
+  const TemporaryFolder folder;
+  write_image(folder.path() / "5.png", plain(50));
+  FillingFolder filling({[&] { step(folder.path()); }, [] {}});
+  return refusal([&] {
+    VideoFrames video(folder.path(), FrameColour::grey, filling.more());
+    while (!video.next().empty()) {
+    }
+  });
+}
+
+TEST(VideoFrames, OfAFolderThatFillsComeInOrder) {
+  EXPECT_EQ(refusal_after([](const auto& folder) { write_image(folder / "6.png", plain(60)); }), "");
+  EXPECT_EQ(refusal_after([](const auto& folder) { std::filesystem::remove(folder / "5.png"); }), "");
+  EXPECT_THAT(refusal_after([](const auto& folder) { write_image(folder / "4.png", plain(40)); }),
+              HasSubstr("4.png: came after 5.png; images must come in order"));
+  EXPECT_THAT(refusal_after([](const auto& folder) { write_part(folder / "6.png", 60, 50); }),
+              HasSubstr("6.png: the image is cut off"));
+  EXPECT_THAT(refusal_after([](const auto& folder) {
+                write_part(folder / "6.png", 60, 50);  // and it will not be: the next one is there
+                write_image(folder / "7.png", plain(70));
+              }),
+              HasSubstr("6.png: the image is cut off"));
+}
+
+/// Numbers that were given cannot be taken back: those of a whole folder with such a name are counts.
+TEST(VideoFrames, OfAFolderThatFillsKeepTheirNumbers) {
+  const TemporaryFolder folder;
+  write_image(folder.path() / "5.png", plain(50));
+  write_image(folder.path() / "7.png", plain(70));
+  FillingFolder filling({[&] { write_image(folder.path() / "last.png", plain(80)); }});
+  VideoFrames video(folder.path(), FrameColour::grey, filling.more());
+  EXPECT_THAT(refusal([&] {
+                while (!video.next().empty()) {
+                }
+              }),
+              HasSubstr("images without a number of their own behind 7.png"));
+}
+
+TEST(VideoFrames, OfAFileAreNotWaitedFor) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::filesystem::path& path) {
+    return refusal([&] {
+      VideoFrames video(path, FrameColour::grey, [] { return false; });
+      (void)video.next();
+    });
+  };
+  write_file(folder.path() / "turn.y4m", raw_video({60}));
+  EXPECT_THAT(refused(folder.path() / "turn.y4m"), HasSubstr("only a folder"));
+  EXPECT_THAT(refused(folder.path() / "none"), HasSubstr("no such file"));
+  EXPECT_THAT(refused(folder.path()), HasSubstr("holds no photos"));
+}
+
 TEST(VideoFrames, CanBeLeftHalfway) {
   const TemporaryFolder folder;
   write_file(folder.path() / "long.y4m", raw_video(std::vector<int>(400, 90)));

@@ -49,7 +49,7 @@ TEST(Observe, SaysWhatIsWrongWithItsInput) {
   expect({"none.csv", "--method", "best"}, 2, "--method");
   expect({"none.csv", "--estimate", "k9"}, 2,
          "--estimate: 'k9' is not auto, none, k1, k2, k3, p1, p2, mount, delay, lever, shutter, focal-drift, scale, "
-         "backlash, curve, drift, bias or clock");
+         "backlash, curve, axes, drift, bias or clock");
   expect({"none.csv", "--start", "1,2,3,nan"}, 2, "--start");
   expect({(folder.path() / "none.csv").string()}, 3, "none.csv");
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "out"));

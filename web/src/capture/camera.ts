@@ -58,10 +58,13 @@ export class Camera {
   }
 
   private async read(): Promise<void> {
-    while (!this.isStopped && this.reader) {
+    while (this.reader) {
       const {value, done} = await this.reader.read().catch(() => ({value: undefined, done: true}));
-      if (done || !value) return;
-      if (this.isStopped) return value.close(); // one that was on its way
+      if (done || !value) return; // as its track has ended
+      if (this.isStopped) { // on its way: the browser complains of those that nobody closes
+        value.close();
+        continue;
+      }
       this.newest?.close(); // nothing is queued
       this.newest = value;
       this.waiting?.();
@@ -116,7 +119,6 @@ export class Camera {
 
   stop(): void {
     this.isStopped = true;
-    void this.reader?.cancel().catch(() => undefined);
     this.newest?.close();
     this.newest = null;
     for (const track of this.stream.getTracks()) track.stop();

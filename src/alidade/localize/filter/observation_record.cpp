@@ -253,7 +253,7 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
   }
   for (const KnownPoint& given : config.target.points)
     if (!filter.has(given.id))
-      problem.points.push_back({given.id, given.point_in_world, given.point_in_world, given.sigma_m, 0, {}});
+      problem.points.push_back({given.id, given.point_in_world, given.point_in_world, given.sigma_m, 0, {}, {}});
 }
 
 void ObservationRecord::add_gone(const LocalizeConfig& config, std::span<const GonePoint> gone,

@@ -19,8 +19,14 @@ namespace {
 /// What there is to say of rows that a user has already read: on stderr, and to those who watch.
 class RowsVerdict {
  public:
-  explicit RowsVerdict(const FrameByFrame& given) : server_(given.server) {
-    if (given.is_up_to_scale) say(0.0, "rows are up to scale, in the first camera's frame: metres, if any, at the end");
+  explicit RowsVerdict(const FrameByFrame& given) : server_(given.server), is_up_to_scale_(given.is_up_to_scale) {}
+
+  /// Of how many frames this is, or all: an input that cannot be read has one line, which says why.
+  void say_scale(std::size_t count, bool is_all = false) {
+    constexpr std::size_t readable = 100;
+    if (!is_up_to_scale_ || count == 0 || (count < readable && !is_all)) return;
+    is_up_to_scale_ = false;  // said
+    say(0.0, "rows are up to scale, in the first camera's frame: metres, if any, at the end");
   }
 
   /// Each kind of thing once: rows of a wrong lens stay off where they fit each other again.
@@ -46,6 +52,7 @@ class RowsVerdict {
   }
 
   live::Server* server_;
+  bool is_up_to_scale_;
   std::set<std::string> said_;  ///< Names of checks.
 };
 
@@ -105,10 +112,12 @@ Localization localize_input(const ObservationsOptions& reading, const FrameByFra
   while (const std::optional<ObservationFrame> frame = frames.next()) {
     report_progress(given.progress, "frames", ++count, 0);
     rows.print(localizer.push(*frame));
+    said.say_scale(count);
     if (count == vague) static_cast<void>(localizer.recent());
     if (count % judged_every == 0) said.take(localizer.recent(), *frame);
   }
   report_progress(given.progress, "frames", count, 0);  // the input may have ended by Ctrl-C
+  said.say_scale(count, true);
   given.run.lap("read");
   Localization result = localizer.finish(given.truth);
   result.counts.given += frames.skipped().size();
@@ -122,14 +131,17 @@ Localization localize_growing(const std::filesystem::path& folder, double rate_h
   const ImageStream images = images_in(folder, given.camera, rate_hz, [&wait] { return wait.more(); });
   Localizer localizer(given.camera, given.config);
   const PoseRows rows(given.run);
-  const RowsVerdict said(given);  // of images no more than whether rows are up to scale
+  RowsVerdict said(given);  // of images no more than whether rows are up to scale
+  std::size_t count = 0;
   cv::Mat grey;
   long frame = 0;
   double t_s = 0.0;
   while (images.next(grey, frame, t_s)) {
     wait.came();
     rows.print(localizer.push(grey, frame, t_s));
+    said.say_scale(++count);
   }
+  said.say_scale(count, true);
   given.run.lap("read");
   return localizer.finish(given.truth);
 }

@@ -26,7 +26,8 @@ struct MoveLimits {
 /// four, where each was seen last.
 [[nodiscard]] std::vector<Eigen::Vector2d> points_at_end(std::span<const ObserveResidual> seen, double frames_per_s);
 
-/// What is estimated beside fx, fy, cx, cy is to the plan assumed with its σ: no value, or a σ of null, is none.
+/// Adds what an observation estimated beside fx, fy, cx, cy, by its name in results ("k1", "mount_x_rad"), as assumed
+/// with that σ: the moves do not estimate it. Nothing where no cause of that name is counted.
 void assume_estimated(const std::string& quantity, double sigma, std::vector<Assumption>& assumed);
 
 }  // namespace alidade

@@ -166,6 +166,23 @@ TEST_F(LocalizeImageFolders, AFolderThatFillsGivesWhatItGivesWhenFull) {
   EXPECT_GT(std::ranges::count(filled.out, '\n'), std::ranges::count(poses, '\n'));
 }
 
+/// Without a target that rows are up to scale is said as well, but not before the input has been read.
+TEST_F(LocalizeImageFolders, ALiveInputThatCannotBeReadHasOneLine) {
+  write_file(path("rows.csv"), "frame,t_s,point_id,u_px,v_px\n0,0,1,100,100\n1,0.1,1,nan,3\n");
+  const Outcome rows =
+      testing::run_program({"sh", "-c",
+                            fmt::format("'{}' localize - --quiet --camera '{}' --out '{}' < '{}'", ALIDADE_EXECUTABLE,
+                                        path("sim/camera.yaml"), path("out"), path("rows.csv"))});
+  EXPECT_EQ(rows.code, 3);
+  EXPECT_EQ(std::ranges::count(rows.err, '\n'), 1) << rows.err;
+  fs::create_directories(path("broken"));
+  write_file(path("broken/000000.png"), "no image");
+  const Outcome images = alidade({"localize", path("broken"), "--camera", path("sim/camera.yaml"), "--rate", "30",
+                                  "--wait", "0.1", "--out", path("out")});
+  EXPECT_EQ(images.code, 3);
+  EXPECT_EQ(std::ranges::count(images.err, '\n'), 1) << images.err;
+}
+
 TEST_F(LocalizeImageFolders, WaitsForNothingElse) {
   fs::create_directories(path("empty"));
   expect_refused("empty", {"--rate", "30", "--wait", "0.1"}, 3, "the folder holds no photos");

@@ -71,11 +71,28 @@ export async function started(alidade, args, name, job = ['calibrate', ...board]
 export async function cameraBrowser(y4m) {
   return launch(['--use-fake-ui-for-media-stream', '--use-fake-device-for-media-stream', `--use-file-for-fake-video-capture=${y4m}`]);
 }
+/** Counts the images that the page is handed and those it closes. */
+function countImages() {
+  const counts = (window.images = {read: 0, open: new Set()}), {read} = ReadableStreamDefaultReader.prototype, {close} = VideoFrame.prototype;
+  ReadableStreamDefaultReader.prototype.read = async function () {
+    const chunk = await read.call(this);
+    if (chunk.value instanceof VideoFrame) ++counts.read, counts.open.add(chunk.value);
+    return chunk;
+  };
+  VideoFrame.prototype.close = function () {
+    counts.open.delete(this);
+    close.call(this);
+  };
+}
+// The browser's own word on images that nobody closes: a loaded one says it of images that it made and never handed over. What was handed over is counted instead.
+const isOfImages = (message) => message.text().startsWith('A VideoFrame was garbage collected');
+
 export async function opened(browser, url, {width = 1280, height = 900, theme = 'light', permissions = ['camera'], before = null} = {}) {
   const context = await browser.newContext({viewport: {width, height}, colorScheme: theme, permissions}), page = await context.newPage(), faults = [];
   page.setDefaultTimeout(patience_ms);
+  await page.addInitScript(countImages);
   if (before) await page.addInitScript(before);
-  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && faults.push(`console: ${message.text()}`));
+  page.on('console', (message) => !isOfImages(message) && ['error', 'warning'].includes(message.type()) && faults.push(`console: ${message.text()}`));
   page.on('pageerror', (error) => faults.push(`error: ${error.message}`));
   page.on('request', (one) => !one.url().startsWith(new URL(url).origin) && !/^(data|blob):/.test(one.url()) && faults.push(`request: ${one.url()}`));
   await page.goto(url);
@@ -113,6 +130,9 @@ async function aFilmIsKeptBitForBitAndBecomesTheReport({alidade}) {
     const [code] = await run.exited;
     assert.ok(code === 0 || code === 6, `${code}: ${run.said()}`);
     assert.deepEqual(shown.faults, []);
+    const images = () => shown.page.evaluate(() => ({read: window.images.read, open: window.images.open.size}));
+    assert.ok((await images()).read > 4);
+    await until('every image is closed', async () => (await images()).open === 0, 10_000);
     const rows = readFileSync(at('film', 'photos.csv'), 'utf8').trim().split('\n');
     assert.equal(rows[0], 'file,t_s,exact');
     const kept = readdirSync(at('film', 'photos')).sort();

@@ -159,6 +159,10 @@ std::string unseen_text(const UnseenErrors& unseen) {
       text += " of its range (" + text_of(1e3 * one.share * unseen.range_m, 2) + " mm at " +
               text_of(unseen.range_m, 2) + " m)";
   }
+  if (std::ranges::any_of(unseen.params, [](const RigPower* one) { return one->name.ends_with("_zero_rad"); }))
+    text +=
+        "; an error that an encoder has only at some angles (a ring off its centre, or oval) is there as one of "
+        "its zero";
   return text;
 }
 

@@ -139,6 +139,35 @@ TEST(UnseenErrors, AreSaidInOneRow) {
   EXPECT_LT(*known.sigma_in_sigma, 1.2);
 }
 
+/// An oval ring (two periods a turn) of the second head's pan: no observations of two heads show it, and the target is
+/// more than 5σ off; by a rig file that states the encoder's σ it is not.
+TEST(UnseenErrors, CountAnEncoderThatIsWrongAtSomeAngles) {
+  constexpr double amplitude_rad = 5.0 * small_rad;
+  Sample sample(2);
+  auto observations = sample.observations(4);
+  for (TargetObservation& observation : observations)
+    if (observation.head == 1)
+      observation.pan_tilt_rad.x() += amplitude_rad * std::sin(2.0 * observation.pan_tilt_rad.x() + 1.0);
+  const auto worst_sigma = [&](const TrackReport& report) {
+    double worst = 0.0;
+    for (const TrackStep& step : report.steps)
+      if (step.has_belief && step.t_s > 1.5)
+        for (int k = 0; k < 3; ++k)
+          worst = std::max(
+              worst, std::abs(step.belief.x[k] - sample.scene.position(step.t_s)[k]) / std::sqrt(step.belief.P(k, k)));
+    return worst;
+  };
+  const TrackReport exact = track_target(observations, sample.rig.heads, sample.config);
+  EXPECT_LT(exact.faults.front().z, max_fault_z(exact));
+  EXPECT_GT(worst_sigma(exact), 5.0);
+  const std::string text = unseen_text(sample.unseen(observations, exact));
+  EXPECT_NE(text.find("an error that an encoder has only at some angles"), std::string::npos) << text;
+  for (int h = 0; h < 2; ++h)
+    sample.rig.encoder_errors.push_back({.sigma_zero_rad = amplitude_rad * std::sqrt(0.5), .sigma_scale = 0.0});
+  sample.config.tracker.errors = rig_uncertainty(sample.rig);
+  EXPECT_LT(worst_sigma(track_target(observations, sample.rig.heads, sample.config)), 4.0);
+}
+
 /// Three heads: an error of the second's pan zero shows, and as clearly as stated.
 TEST(UnseenErrors, OfThreeHeadsShowAsStated) {
   const int draws = testing::trials(6);

@@ -117,12 +117,6 @@ bool is_of_clock(const RigFault& fault) { return fault.name.ends_with("clock_s")
 
 double ln_gain(const RigFault& fault) { return 0.5 * fault.z * fault.z; }
 
-/// Whether a fault explains the observations as well as the first: of so much ln p a choice may err once in 20.
-bool is_alike(const RigFault& first, const RigFault& fault) {
-  constexpr double clear = 3.0;
-  return ln_gain(first) - ln_gain(fault) < clear;
-}
-
 /// Of parameters that do the same the one that is tested first is named first.
 void put_first(std::vector<RigFault>& faults, std::span<const std::string> order) {
   constexpr double same = 0.1;
@@ -194,6 +188,11 @@ RigTests rig_faults(std::span<const TargetObservation> observations, std::span<c
   put_first(tested.faults, tested.names);
   tests.faults = std::move(tested.faults);
   return tests;
+}
+
+bool is_alike(const RigFault& first, const RigFault& fault) {
+  constexpr double clear = 3.0;
+  return ln_gain(first) - ln_gain(fault) < clear;
 }
 
 std::vector<RigFault> alike_per_head(const TrackReport& report) {

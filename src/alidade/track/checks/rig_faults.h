@@ -24,6 +24,9 @@ struct RigTests {
 [[nodiscard]] RigTests rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                   const TrackerConfig& config);
 
+/// Whether a fault explains the observations as well as the first: of so much ln p a choice may err once in 20.
+[[nodiscard]] bool is_alike(const RigFault& first, const RigFault& fault);
+
 /// The first fault, if it is significant, and of each head the first of those that explain the observations as well.
 [[nodiscard]] std::vector<RigFault> alike_per_head(const TrackReport& report);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/track/checks/time_steps.h"
 #include "alidade/track/checks/unseen_errors.h"
 
 namespace alidade {
@@ -167,6 +168,18 @@ std::optional<Assumption> not_tested(std::span<const TargetObservation> observat
   return row;
 }
 
+/// One row for times that may have been rounded. Of true ones they differ in nothing, so that it has no say, either.
+std::optional<Assumption> times_not_tested(std::span<const TargetObservation> observations, const TrackReport& report,
+                                           double sigma_clock_s) {
+  const auto move = move_within_step(observations, report);
+  if (!move) return std::nullopt;
+  Assumption row{
+      .name = "times.not_tested", .value = move->step_s, .ordinary = move->step_s, .moved = step_text(*move)};
+  row.sigma = sigma_clock_s;
+  row.moves = std::nan("");
+  return row;
+}
+
 }  // namespace
 
 std::vector<HeadReading> readings_at(std::span<const TargetObservation> observations, std::size_t num_heads,
@@ -234,6 +247,7 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
   if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations say
   lister.assumed.push_back(std::move(motion));
+  if (auto row = times_not_tested(observations, report, given.sigma_clock_s)) lister.assumed.push_back(std::move(*row));
   if (auto row = not_tested(observations, rig, config, report)) lister.assumed.push_back(std::move(*row));
   return std::move(lister.assumed);
 }

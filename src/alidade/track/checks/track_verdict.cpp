@@ -10,7 +10,9 @@
 #include "alidade/track/checks/clock_shift.h"
 #include "alidade/track/checks/explanation.h"
 #include "alidade/track/checks/frozen_rows.h"
+#include "alidade/track/checks/lean.h"
 #include "alidade/track/checks/rig_faults.h"
+#include "alidade/track/checks/time_steps.h"
 #include "alidade/track/track.h"
 
 namespace alidade {
@@ -115,53 +117,13 @@ Check check(std::string name, State state, std::string text, double value, doubl
   return {std::move(name), state, std::move(text), value, limit, std::move(unit), "track"};
 }
 
-/// The lean of one head's innovations that no noise explains, and what usually does it.
-struct Lean {
-  std::string text;
-  double size = 0.0;
-};
-
-/// A target that --method describes badly leans, too, by up to half of these: see scenario C.
-constexpr double min_mean = 0.4, min_along = 0.6, min_slope = 1.2;
-
-void take_if_worse(std::string text, double size, double least, double z, Lean& worst) {
-  constexpr double min_z = 6.0;
-  if (std::abs(size) > least && std::abs(z) > min_z && std::abs(size) > worst.size)
-    worst = {std::move(text), std::abs(size)};
-}
-
-void take_worst_of(const HeadInnovations& of, const std::string& head, Lean& worst) {
-  const double root = std::sqrt(static_cast<double>(of.num));
-  for (int k = 0; k < 2; ++k) {
-    take_if_worse(head + " sees the target to one side of where it is expected, by " +
-                      text_of(std::abs(of.mean[k]), 2) + "σ in " + (k == 0 ? "u" : "v") +
-                      ": its mounting or an encoder's zero",
-                  of.mean[k], min_mean, root * of.mean[k], worst);
-    take_if_worse("the innovations of " + head + " grow with the position in the image, by " +
-                      text_of(std::abs(of.position_slope[k]), 2) + "σ a quarter of it: its focal length, or a scale",
-                  of.position_slope[k], min_slope, of.position_slope[k] * std::sqrt(of.position_squares), worst);
-  }
-  take_if_worse(head + " sees the target " + (of.along > 0.0 ? "ahead of" : "behind") + " where it is expected, by " +
-                    text_of(std::abs(of.along), 2) +
-                    "σ along its motion: clocks, or a target that --method does not describe",
-                of.along, min_along, root * of.along, worst);
-}
-
-/// The largest lean of all heads.
-Lean worst_lean(const TrackReport& report, std::span<const RigHead> heads) {
-  Lean worst;
-  for (std::size_t h = 0; h < report.innovations.size() && h < heads.size(); ++h)
-    take_worst_of(report.innovations[h], "head " + std::to_string(heads[h].head.id), worst);
-  return worst;
-}
-
 /// Whether innovations are white, and what of the rig the observations contradict.
 void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
   const Lean lean = worst_lean(report, heads);
   const Check lean_check =
       check("lean", lean.size > 0.0 ? State::care : State::good,
             lean.size > 0.0 ? lean.text : "by head, motion and position the innovations have no lean", lean.size,
-            min_mean, "σ");
+            min_mean_lean, "σ");
   if (!report.faults.empty()) {
     const double z = report.faults.front().z, max_z = max_fault_z(report);
     verdict.checks.push_back(check("rig", z > max_z ? State::care : State::good,
@@ -280,6 +242,7 @@ struct Causes {
   std::optional<Fault> mistake;
   std::optional<Check> second, falls;
   std::optional<ClockShift> shift;
+  double step_s = 0.0;  ///< Of all times, if rounding to it explains as much.
 };
 
 Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
@@ -304,6 +267,18 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   return causes;
 }
 
+std::string clocks_text(const Causes& causes, std::span<const RigHead> heads) {
+  return clock_text(*causes.shift, heads) + (causes.step_s > 0.0 ? "; " + rounding_text(causes.step_s) : "");
+}
+
+void add_clocks(const Causes& causes, std::span<const RigHead> heads, Verdict& verdict) {
+  if (causes.shift)
+    verdict.checks.push_back(
+        check("clocks", State::care, clocks_text(causes, heads), 1e3 * causes.shift->later_s, 0.0, "ms"));
+  else if (causes.step_s > 0.0)
+    verdict.checks.push_back(check("times", State::care, rounding_text(causes.step_s), 1e3 * causes.step_s, 0.0, "ms"));
+}
+
 /// Why there is no track.
 std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
                                 std::span<const TargetObservation> observations, std::span<const RigHead> heads,
@@ -322,7 +297,9 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
                  fault_remedy(report, heads)};
   if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_rejected)) return causes.mistake;
   if (fits(report)) return std::nullopt;
-  if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
+  if (causes.shift)
+    return Fault{clocks_text(causes, heads),
+                 causes.step_s > 0.0 ? rounding_remedy(causes.step_s) : "set the heads' clocks"};
   if (report.num_starts == 0) return why_no_start(observations, heads, config);
   if (causes.second) return Fault{causes.second->text, "give the observations of one target: one row per image"};
   if (used_share(report) < min_used_share)
@@ -340,8 +317,8 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
   // Beside what only says how bad it is, what it may come from.
-  constexpr std::array<std::string_view, 7> names{"frozen", "clocks", "mistake", "second target",
-                                                  "falls",  "rig",    "lean"};
+  constexpr std::array<std::string_view, 9> names{"frozen",        "times", "clocks", "mistake",
+                                                  "second target", "falls", "rig",    "lean"};
   const auto cause = std::ranges::find_if(
       verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
   if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
@@ -365,16 +342,15 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   if (seen_by.size() < 2)
     return refused({"one head only: the range along its ray cannot be determined", "add the events of a second head"});
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
-  const Causes causes = causes_of(report, observations, heads, config);
+  Causes causes = causes_of(report, observations, heads, config);
+  causes.step_s = step_that_explains(observations, report, causes.shift);
   if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
   Verdict verdict;
   const auto frozen = frozen_rows(with_shift(observations, {}), heads.size());
   if (frozen)
     verdict.checks.push_back(
         check("frozen", State::care, frozen_text(*frozen, heads), static_cast<double>(frozen->num), 0.0, "rows"));
-  if (causes.shift)
-    verdict.checks.push_back(
-        check("clocks", State::care, clock_text(*causes.shift, heads), 1e3 * causes.shift->later_s, 0.0, "ms"));
+  add_clocks(causes, heads, verdict);
   if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
   if (causes.second) verdict.checks.push_back(*causes.second);
   if (causes.falls) verdict.checks.push_back(*causes.falls);
@@ -383,6 +359,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   put_likelier_first(verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
   if (!alike_per_head(report).empty()) verdict.to_add = fault_remedy(report, heads);
+  if (causes.step_s > 0.0) verdict.to_add = rounding_remedy(causes.step_s);
   if (frozen) verdict.to_add = frozen_remedy(*frozen, heads);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   verdict.sentence = sentence_of(report, verdict);

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "alidade/track/track.h"
+
+namespace alidade {
+
+struct ClockShift;
+
+/// The largest step that all capture times are whole multiples of apart. 0: none of 0.1 ms or more, or too
+/// few times. Images that all heads take together at a constant rate have one, and so have times that were rounded:
+/// the times themselves do not tell which.
+[[nodiscard]] double step_of_times(std::span<const TargetObservation> observations);
+
+/// What times that were rounded to that step do to the target: how far it goes within a step, and in σ of its position;
+/// medians over the track.
+struct StepMove {
+  double step_s = 0.0, moved_m = 0.0, moved_in_sigma = 0.0;
+};
+
+/// None where all times have no step, or where it moves the target by less than half of σ.
+[[nodiscard]] std::optional<StepMove> move_within_step(std::span<const TargetObservation> observations,
+                                                       const TrackReport& report);
+
+/// "all t_capture_s are whole steps of 50 ms apart: …, which no observations show".
+[[nodiscard]] std::string step_text(const StepMove& move);
+
+/// The step, if a clock of a head that is off by no more than that explains what does not fit: the shift, or a fault
+/// that explains as much as the first one. Else 0.
+[[nodiscard]] double step_that_explains(std::span<const TargetObservation> observations, const TrackReport& report,
+                                        const std::optional<ClockShift>& shift);
+
+/// "all times are whole steps of 50 ms apart: if they were rounded to that, …", and what to do.
+[[nodiscard]] std::string rounding_text(double step_s);
+[[nodiscard]] std::string rounding_remedy(double step_s);
+
+}  // namespace alidade

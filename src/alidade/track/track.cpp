@@ -7,6 +7,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/track/checks/rig_faults.h"
+#include "alidade/track/checks/time_jitter.h"
 #include "alidade/track/xiahou_tracker.h"
 
 namespace alidade {
@@ -187,6 +188,7 @@ void judge_observations(std::span<const TargetObservation> observations, std::sp
   const std::vector<TrackStep> steps = followed(sorted, heads, learning, config.progress).steps;
   report.nis_per_dof = mean_nis(steps, counted(steps, config.warm_up_s), config.tracker.gate);
   report.innovations = test_innovations(sorted, heads, steps, config);
+  report.jitter = time_jitter(sorted, heads, steps, config.tracker.gate);
   RigTests tests = rig_faults(sorted, heads, config.tracker);
   report.faults = std::move(tests.faults);
   report.power = std::move(tests.power);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,12 @@ struct RigPower {
   double z_per_unit = 0;  ///< By how much an error of one unit would raise z: 0 is never seen.
 };
 
+/// Capture times that scatter about those at which images were taken.
+struct TimeJitter {
+  double sigma_s = 0.0;  ///< Of one time.
+  double gain = 0.0;     ///< Of ln p, over innovations that are larger by one factor, whatever the motion.
+};
+
 /// What became of all observations, and how good it is. Positions and velocities are in the rig's world.
 struct TrackReport {
   enum class Status { tracked, no_start };
@@ -78,11 +85,12 @@ struct TrackReport {
   /// Of a filter that estimates the rig's errors where they are considered: with them only considered, innovations are
   /// coloured by what does not change. One per head.
   std::vector<HeadInnovations> innovations;
-  double inflation = 1.0;           ///< Every covariance was increased by this factor, from the innovations.
-  std::vector<RigFault> faults;     ///< The most significant first.
-  std::vector<RigPower> power;      ///< Of each parameter that is tested.
-  bool fits_without_fault = false;  ///< The first is significant, and with it corrected the observations fit.
-  bool errors_are_counted = false;  ///< Those of the rig.
+  std::optional<TimeJitter> jitter;  ///< Where the innovations ask for it.
+  double inflation = 1.0;            ///< Every covariance was increased by this factor, from the innovations.
+  std::vector<RigFault> faults;      ///< The most significant first.
+  std::vector<RigPower> power;       ///< Of each parameter that is tested.
+  bool fits_without_fault = false;   ///< The first is significant, and with it corrected the observations fit.
+  bool errors_are_counted = false;   ///< Those of the rig.
 };
 
 /// Called with each observation and what became of it. What it throws ends the work.

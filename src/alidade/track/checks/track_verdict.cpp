@@ -12,6 +12,7 @@
 #include "alidade/track/checks/frozen_rows.h"
 #include "alidade/track/checks/lean.h"
 #include "alidade/track/checks/rig_faults.h"
+#include "alidade/track/checks/time_jitter.h"
 #include "alidade/track/checks/time_steps.h"
 #include "alidade/track/track.h"
 
@@ -253,14 +254,15 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   const bool is_explained = is_explained_by_fault(report);
   if (is_explained && !fits(report)) return causes;
   const bool is_odd = !fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected;
-  if (is_odd && !is_explained) causes.mistake = explanation_of(observations, heads, config);
+  const bool is_jitter = report.jitter && fits(report);
+  if (is_odd && !is_explained && !is_jitter) causes.mistake = explanation_of(observations, heads, config);
   if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
   causes.shift = probable_clock_shift(observations, heads, found, rivals_of_clocks(report));
   // A head with a wrong clock agrees with none of the others, either.
   if (causes.mistake && !causes.shift) return causes;
   causes.mistake.reset();
   if (causes.shift && causes.shift->is_worse_than_rival() && !alike_per_head(report).empty()) causes.shift.reset();
-  if (is_explained) return causes;
+  if (is_explained || is_jitter) return causes;
   causes.second = second_target(report, observations, heads, found);
   if (report.num_restarts > 0 || report.nis_per_dof > good_nis_high)
     causes.falls = falling_target(observations, heads, config);
@@ -317,8 +319,8 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
   // Beside what only says how bad it is, what it may come from.
-  constexpr std::array<std::string_view, 9> names{"frozen",        "times", "clocks", "mistake",
-                                                  "second target", "falls", "rig",    "lean"};
+  constexpr std::array<std::string_view, 9> names{"frozen",        "jitter", "times", "clocks", "mistake",
+                                                  "second target", "falls",  "rig",   "lean"};
   const auto cause = std::ranges::find_if(
       verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
   if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
@@ -350,6 +352,9 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   if (frozen)
     verdict.checks.push_back(
         check("frozen", State::care, frozen_text(*frozen, heads), static_cast<double>(frozen->num), 0.0, "rows"));
+  if (report.jitter)
+    verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
+                                   1e3 * report.jitter->sigma_s, 0.0, "ms"));
   add_clocks(causes, heads, verdict);
   if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
   if (causes.second) verdict.checks.push_back(*causes.second);
@@ -360,6 +365,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
   if (!alike_per_head(report).empty()) verdict.to_add = fault_remedy(report, heads);
   if (causes.step_s > 0.0) verdict.to_add = rounding_remedy(causes.step_s);
+  if (report.jitter) verdict.to_add = jitter_remedy();
   if (frozen) verdict.to_add = frozen_remedy(*frozen, heads);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   verdict.sentence = sentence_of(report, verdict);

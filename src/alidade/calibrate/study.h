@@ -55,6 +55,9 @@ struct CalibrationStudy {
   std::vector<HeldOutModel> models;  ///< Empty for fewer than six photos.
   std::optional<ShapeTransfer>
       transfer;  ///< Of the shape in use, else of the most informative one; none for few photos.
+  /// How the print departs from its grid, where that is proved and would move the lens by more than two of its σ; empty
+  /// otherwise. With every point free it is estimated.
+  std::string print;
 };
 
 /// Residual structure, σ maps, halves and held-out error of other models; `transfer` is passed on. `report` must have

@@ -213,7 +213,11 @@ Check board_flat(const CalibrationStudy& study, const CalibrateConfig& config) {
                               rounded(transfer.transfer_rms_px, 3) + " px with the shape learned on the others (" +
                               shape_name(transfer.shape) + ")";
   check.value = transfer.transfer_rms_px / transfer.flat_rms_px;
-  if (config.board_shape == BoardShape::bow || config.board_shape == BoardShape::free) {
+  const bool is_free = config.board_shape == BoardShape::free;
+  if (!study.print.empty() && !(is_free && transfer.transfers())) {
+    check.state = is_free ? State::good : State::care;
+    check.text = study.print + (is_free ? ": every point is estimated" : ": σ includes it");
+  } else if (config.board_shape == BoardShape::bow || is_free) {
     check.state = transfer.transfers() ? State::good : State::bad;
     check.text = (transfer.transfers() ? "the shape transfers: " : "the shape does not transfer: ") + figures;
   } else {
@@ -278,6 +282,7 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
   if (text_starts("board flat", "the board bends")) return "use --board-shape " + shape_name(study.transfer->shape);
   if (text_starts("board flat", "the board has another shape"))
     return "use --board-shape auto, or this board's own points";
+  if (ails("board flat") && text_starts("board flat", "the print")) return "use --board-shape free";
   if (ails("lens adequate") && is_port) return "check the lens in air, --glass and --n-water, or take --model brown";
   if (!better_model.empty()) return better_model + ", which fits better on held-out photos";
   if (ails("lens adequate"))

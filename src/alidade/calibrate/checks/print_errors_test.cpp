@@ -1,0 +1,136 @@
+#include "alidade/calibrate/checks/print_errors.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "alidade/testing/calibration_sample.h"
+#include "alidade/testing/trials.h"
+
+// A board whose print departs from its grid. ALIDADE_TEST_TRIALS=20 draws as many sets of each kind.
+
+namespace alidade {
+namespace {
+
+using testing::check_named;
+using ::testing::HasSubstr;
+using testing::sample_board;
+using testing::sample_calibration;
+using testing::sample_camera;
+using testing::sample_size;
+using testing::trials;
+
+using Print = std::function<Eigen::Vector3d(const Eigen::Vector3d& point)>;
+
+constexpr double length_m = 8 * 0.025;  // of the longer side
+
+Eigen::Vector3d as_given(const Eigen::Vector3d& point) { return point; }
+
+/// Longer along its rows by a share.
+Print stretched(double share) {
+  return [=](const Eigen::Vector3d& point) { return Eigen::Vector3d(point.x() * (1.0 + share), point.y(), point.z()); };
+}
+
+/// Squares that grow along the rows, at their end by twice the share.
+Print growing(double share) {
+  return [=](const Eigen::Vector3d& point) {
+    return Eigen::Vector3d(point.x() + share * point.x() * point.x() / length_m, point.y(), point.z());
+  };
+}
+
+std::vector<BoardView> views_of(const Print& print, int draw, bool know_sigma = true) {
+  const auto seed = static_cast<std::uint64_t>(draw + 1);
+  BoardScene scene = testing::covered_scene(sample_camera("brown"), 24, seed);
+  for (Eigen::Vector3d& point : scene.points_in_board) point = print(point);
+  return testing::sample_views(scene, seed, know_sigma);
+}
+
+/// Error of fx − fy in its stated σ.
+double sigmas_of_aspect(const Camera& camera) {
+  const Eigen::VectorXd off = params(camera.lens) - params(sample_camera("brown").lens);
+  const double variance = camera.cov(0, 0) + camera.cov(1, 1) - 2.0 * camera.cov(0, 1);
+  return std::abs(off[0] - off[1]) / std::sqrt(variance);
+}
+
+/// The largest error of a parameter in its stated σ.
+double most_sigmas(const Camera& camera) {
+  const Eigen::ArrayXd off = params(camera.lens) - params(sample_camera("brown").lens);
+  double most = 0.0;
+  for (const Eigen::Index at : {0, 1, 2, 3, 5, 6, 7, 8, 9})
+    most = std::max(most, std::abs(off[at]) / std::sqrt(camera.cov(at, at)));
+  return most;
+}
+
+// 0.8 mm in 200 pay for no point of their own on unseen photos.
+TEST(PrintErrors, ABoardThatIsTooLongIsEstimated) {
+  for (int draw = 0; draw < trials(3); ++draw) {
+    const std::vector<BoardView> views = views_of(stretched(0.004), draw);
+    const CalibrateReport assumed_true = calibrate(sample_board, views, sample_size, {});
+    const Calibration result = sample_calibration(views);
+    EXPECT_EQ(result.config.board_shape, BoardShape::free) << draw;
+    EXPECT_LT(sigmas_of_aspect(result.camera), 4.0) << draw;
+    EXPECT_LT(most_sigmas(result.camera), 4.0) << draw;
+    EXPECT_GT(std::max(sigmas_of_aspect(assumed_true.camera), most_sigmas(assumed_true.camera)), 5.0) << draw;
+    EXPECT_EQ(check_named(result.verdict, "board flat").state, State::good) << draw;
+  }
+}
+
+TEST(PrintErrors, AFlatBoardIsNamedAndCounted) {
+  const CalibrateConfig flat{.board_shape = BoardShape::flat};
+  for (int draw = 0; draw < trials(3); ++draw) {
+    const std::vector<BoardView> views = views_of(stretched(0.004), draw, false);
+    const Calibration result = sample_calibration(views, flat);
+    EXPECT_EQ(result.verdict.state, State::care) << draw;
+    EXPECT_THAT(check_named(result.verdict, "board flat").text, HasSubstr("% too long along its rows")) << draw;
+    EXPECT_EQ(result.verdict.to_add, "use --board-shape free") << draw;
+    EXPECT_LT(sigmas_of_aspect(result.camera), 4.0) << draw;
+    const Calibration advised = sample_calibration(views, {.board_shape = BoardShape::free});
+    EXPECT_EQ(advised.config.board_shape, BoardShape::free) << "as was advised; " << draw;
+    EXPECT_LT(most_sigmas(advised.camera), 4.0) << draw;
+  }
+}
+
+// Sizes from what no test sees to what each one does.
+TEST(PrintErrors, SigmaHoldsAtEverySize) {
+  for (int draw = 0; draw < trials(3); ++draw) {
+    for (const double share : {0.0005, 0.001, 0.0015, 0.002, 0.003}) {
+      const Calibration result = sample_calibration(views_of(stretched(share), draw));
+      EXPECT_LT(sigmas_of_aspect(result.camera), 5.0) << draw << ": " << share;
+      EXPECT_LT(most_sigmas(result.camera), 5.0) << draw << ": " << share;
+    }
+  }
+}
+
+TEST(PrintErrors, SquaresThatGrowAreEstimated) {
+  for (int draw = 0; draw < trials(3); ++draw) {
+    const Calibration result = sample_calibration(views_of(growing(0.002), draw));
+    EXPECT_EQ(result.config.board_shape, BoardShape::free) << draw;
+    EXPECT_LT(most_sigmas(result.camera), 4.0) << draw;
+  }
+}
+
+// One clean set in 2000 is named, one in 50 has a σ that includes what chance shows.
+TEST(PrintErrors, ATrueBoardIsNot) {
+  const int draws = trials(10);
+  int included = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    const std::vector<BoardView> views = views_of(as_given, draw);
+    const CalibrateReport report = calibrate(sample_board, views, sample_size, {});
+    const PrintErrors print = print_errors(views, report);
+    EXPECT_FALSE(print.is_proved) << draw << ": " << print.text;
+    included += print.text.empty() ? 0 : 1;
+  }
+  EXPECT_LE(included, 1 + draws / 10) << included << " of " << draws;
+}
+
+TEST(PrintErrors, TakesSixPhotos) {
+  std::vector<BoardView> views = views_of(stretched(0.01), 0);
+  views.resize(5);
+  const CalibrateReport report = calibrate(sample_board, views, sample_size, {});
+  EXPECT_TRUE(print_errors(views, report).text.empty());
+}
+
+}  // namespace
+}  // namespace alidade

@@ -9,7 +9,7 @@
 #include "alidade/calibrate/checks/calibration_verdict.h"
 #include "alidade/calibrate/checks/judge.h"
 #include "alidade/calibrate/checks/lens_change.h"
-#include "alidade/calibrate/checks/print_errors.h"
+#include "alidade/calibrate/checks/model_errors.h"
 #include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/calibrate/study.h"
 #include "alidade/description/natural_order.h"
@@ -94,25 +94,26 @@ std::vector<ShapeTransfer> settle_shape(Calibration& result, const Progress& pro
   return transfers;
 }
 
-/// A print that departs from its grid: every point is estimated where the shape is to be chosen, else σ includes it.
-/// Returns how it departs, where that is proved and matters. What a few parameters say at 4σ needs no transfer: every
-/// point, learned on half of the photos, brings more noise than the print's error.
-std::string settle_print(Calibration& result) {
-  if (result.config.board_shape == BoardShape::free) return "";
+/// A print that departs from its grid: every point is estimated where the shape is to be chosen. Else, and where the
+/// lens departs from its model, σ includes it. The text is left where that is proved and matters. What a few parameters
+/// say at 4σ needs no transfer: every point, learned on half of the photos, brings more noise than the print's error.
+ModelErrors settle_model(Calibration& result) {
+  if (result.config.board_shape == BoardShape::free) return {};
   constexpr double care_sigmas = 2.0;
-  const PrintErrors print = print_errors(result.board_views, result);
-  const bool matters = print.is_proved && print.moves > care_sigmas;
+  ModelErrors errors = model_errors(result.board_views, result);
+  const bool matters = errors.is_proved && errors.moves > care_sigmas;
+  if (!matters) errors.text.clear();
   const BoardShape asked = result.asked_shape;
-  if (matters && (asked == BoardShape::automatic || asked == BoardShape::free)) {
+  if (matters && !errors.is_of_lens && (asked == BoardShape::automatic || asked == BoardShape::free)) {
     CalibrateConfig free = result.config;
     free.board_shape = BoardShape::free;
     if (solve_again(free, result)) {
       result.config = std::move(free);
-      return print.text;
+      return errors;
     }
   }
-  if (print.cov.size() > 0) result.camera.cov += print.cov;
-  return matters ? print.text : "";
+  result.camera.cov += errors.cov;
+  return errors;
 }
 
 }  // namespace
@@ -133,7 +134,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
     return result;
   }
   const std::vector<ShapeTransfer> transfers = settle_shape(result, progress);
-  const std::string print = settle_print(result);
+  const ModelErrors errors = settle_model(result);
   result.counts = count_photos(result);
   const std::vector<ViewScore> scores = view_scores(board, result.config, result.board_views, result);
   result.assumed = count_assumptions(board, result.config, result.board_views, scores, air, result);
@@ -142,7 +143,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   if (change.change) count_change(*change.change, result);
   result.study = study_calibration(board, result.board_views, result.config, result,
                                    max_informative(transfers, result.config.board_shape), progress);
-  result.study.print = print;
+  (errors.is_of_lens ? result.study.lens_error : result.study.print_error) = errors.text;
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);

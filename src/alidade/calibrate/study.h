@@ -57,7 +57,8 @@ struct CalibrationStudy {
       transfer;  ///< Of the shape in use, else of the most informative one; none for few photos.
   /// How the print departs from its grid, where that is proved and would move the lens by more than two of its σ; empty
   /// otherwise. With every point free it is estimated.
-  std::string print;
+  std::string print_error;
+  std::string lens_error;  ///< Likewise of the lens, from its model.
 };
 
 /// Residual structure, σ maps, halves and held-out error of other models; `transfer` is passed on. `report` must have

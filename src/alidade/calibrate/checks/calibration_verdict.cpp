@@ -96,6 +96,10 @@ Check lens_adequate(const CalibrationStudy& study) {
   check.state = grade(check.value, 3.0, 8.0);
   check.text = check.state == State::good ? "no ring departs from zero by more than 3σ"
                                           : "a ring departs from zero by " + two(check.value) + "σ";
+  if (!study.lens_error.empty()) {
+    check.state = std::max(check.state, State::care);
+    check.text = study.lens_error + ": σ includes what it moves, not what is left where no boards were";
+  }
   if (better) {
     check.state = std::max(check.state, State::care);
     check.text = better->name + " lowers the held-out error by " + two(better->gain_px) + " ± " +
@@ -214,9 +218,9 @@ Check board_flat(const CalibrationStudy& study, const CalibrateConfig& config) {
                               shape_name(transfer.shape) + ")";
   check.value = transfer.transfer_rms_px / transfer.flat_rms_px;
   const bool is_free = config.board_shape == BoardShape::free;
-  if (!study.print.empty() && !(is_free && transfer.transfers())) {
+  if (!study.print_error.empty() && !(is_free && transfer.transfers())) {
     check.state = is_free ? State::good : State::care;
-    check.text = study.print + (is_free ? ": every point is estimated" : ": σ includes it");
+    check.text = study.print_error + (is_free ? ": every point is estimated" : ": σ includes it");
   } else if (config.board_shape == BoardShape::bow || is_free) {
     check.state = transfer.transfers() ? State::good : State::bad;
     check.text = (transfer.transfers() ? "the shape transfers: " : "the shape does not transfer: ") + figures;
@@ -285,6 +289,8 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
   if (ails("board flat") && text_starts("board flat", "the print")) return "use --board-shape free";
   if (ails("lens adequate") && is_port) return "check the lens in air, --glass and --n-water, or take --model brown";
   if (!better_model.empty()) return better_model + ", which fits better on held-out photos";
+  if (!study.lens_error.empty())
+    return "no lens model here has this term: cover with boards all of the image that is used, and use no more of it";
   if (ails("lens adequate"))
     return "no other lens model fits better: keep focus and zoom still, and look at the rings for where it departs";
   if (ails("coverage") && !next.photos.empty()) {

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+
+#include "alidade/calibrate/calibrate.h"
+
+namespace alidade {
+
+/// How a board's print departs from its grid (longer along than across, rows not perpendicular to columns, a spacing
+/// that changes over the print, quadratic: printers do all of this by a few hundredths of a percent), and a lens from
+/// its model (the next radial term, thin prism).
+struct ModelErrors {
+  std::string text;         ///< The largest, with its size; empty where none is significant.
+  bool is_of_lens = false;  ///< The largest is an error of the lens, not of the print.
+  bool is_proved = false;   ///< The largest, from 4σ: one clean set in 1500 has such.
+  double moves = 0.0;       ///< Of the lens by what is significant, in its stated σ along the direction moved.
+  /// For the covariance of the lens: what is significant (from 3σ: one clean set in 30) moves it by, and the ratio of
+  /// the print's lengths where the photos separate it from fx / fy by less than the stated σ.
+  Eigen::MatrixXd cov;
+};
+
+/// Score tests of them: what the residuals would gain from one more parameter, lens and poses following. σ is that of
+/// the corners' noise or that of the photos' scatter, whichever is larger. Nothing for a camera behind a port, or
+/// fewer than six photos. docs/maths/honest-sigma.md.
+[[nodiscard]] ModelErrors model_errors(std::span<const BoardView> views, const CalibrateReport& report);
+
+}  // namespace alidade

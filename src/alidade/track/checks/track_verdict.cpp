@@ -11,6 +11,7 @@
 #include "alidade/track/checks/explanation.h"
 #include "alidade/track/checks/frozen_rows.h"
 #include "alidade/track/checks/lean.h"
+#include "alidade/track/checks/other_object.h"
 #include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/checks/time_jitter.h"
 #include "alidade/track/checks/time_steps.h"
@@ -243,8 +244,14 @@ struct Causes {
   std::optional<Fault> mistake;
   std::optional<Check> second, falls;
   std::optional<ClockShift> shift;
+  std::optional<OtherObject> other;
   double step_s = 0.0;  ///< Of all times, if rounding to it explains as much.
 };
+
+bool is_doubtful(const TrackReport& report) {
+  return !fits(report) || report.inflation > 1.0 || used_share(report) < 1.0 - care_rejected ||
+         !alike_per_head(report).empty();
+}
 
 Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
                  std::span<const RigHead> heads, const FollowConfig& config) {
@@ -252,6 +259,9 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
   const bool is_explained = is_explained_by_fault(report);
+  if (report.num_starts > 0 && !is_explained && is_doubtful(report))
+    causes.other = other_object(observations, heads, config, report);
+  if (causes.other) return causes;
   if (is_explained && !fits(report)) return causes;
   const bool is_odd = !fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected;
   const bool is_jitter = report.jitter && fits(report);
@@ -271,6 +281,13 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
 
 std::string clocks_text(const Causes& causes, std::span<const RigHead> heads) {
   return clock_text(*causes.shift, heads) + (causes.step_s > 0.0 ? "; " + rounding_text(causes.step_s) : "");
+}
+
+/// Bad where the track followed what it should not have.
+void add_other(const OtherObject& other, std::span<const RigHead> heads, Verdict& verdict) {
+  constexpr double max_sigma = 5.0;
+  verdict.checks.push_back(check("other object", other.moved_in_sigma > max_sigma ? State::bad : State::care,
+                                 other_object_text(other, heads), other.moved_in_sigma, max_sigma, "σ"));
 }
 
 void add_clocks(const Causes& causes, std::span<const RigHead> heads, Verdict& verdict) {
@@ -293,6 +310,8 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
     return Fault{text_of(100.0 * late, 2) + " % of the observations come more than " +
                      text_of(config.tracker.history_s, 2) + " s after others that were taken later",
                  "give them in order of capture, or check t_capture_s of each head: their clocks may differ by that"};
+  if (causes.other && !fits(report))
+    return Fault{other_object_text(*causes.other, heads), other_object_remedy(*causes.other, heads)};
   if (is_explained_by_fault(report) && !fits(report))
     return Fault{"only " + text_of(100.0 * used_share(report), 2) +
                      " % of the observations fit one track and this rig: " + fault_text(report),
@@ -319,8 +338,8 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
   // Beside what only says how bad it is, what it may come from.
-  constexpr std::array<std::string_view, 9> names{"frozen",        "jitter", "times", "clocks", "mistake",
-                                                  "second target", "falls",  "rig",   "lean"};
+  constexpr std::array<std::string_view, 10> names{"frozen",  "other object",  "jitter", "times", "clocks",
+                                                   "mistake", "second target", "falls",  "rig",   "lean"};
   const auto cause = std::ranges::find_if(
       verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
   if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
@@ -352,6 +371,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   if (frozen)
     verdict.checks.push_back(
         check("frozen", State::care, frozen_text(*frozen, heads), static_cast<double>(frozen->num), 0.0, "rows"));
+  if (causes.other) add_other(*causes.other, heads, verdict);
   if (report.jitter)
     verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
                                    1e3 * report.jitter->sigma_s, 0.0, "ms"));
@@ -368,6 +388,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   if (report.jitter) verdict.to_add = jitter_remedy();
   if (frozen) verdict.to_add = frozen_remedy(*frozen, heads);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
+  if (causes.other) verdict.to_add = other_object_remedy(*causes.other, heads);
   verdict.sentence = sentence_of(report, verdict);
   return verdict;
 }

@@ -82,7 +82,12 @@ std::vector<OtherObject> candidates_of(const Rays& rays, std::size_t head) {
   std::vector<std::pair<double, OtherObject>> found;
   const auto add = [&](std::size_t first, std::size_t last, double size, double largest) {
     if (last < first + min_rows || 2 * (last - first) > rays.t_s.size()) return;
-    found.emplace_back(size, OtherObject{head, last - first, rays.t_s[first], rays.t_s[last - 1], largest});
+    found.emplace_back(size, OtherObject{.head = head,
+                                         .num = last - first,
+                                         .from_s = rays.t_s[first],
+                                         .until_s = rays.t_s[last - 1],
+                                         .is_to_an_end = first == 0 || last == rays.t_s.size(),
+                                         .jump_rad = largest});
   };
   for (std::size_t i = 0; i < jumps.size(); ++i) {
     const double size = jumps[i].by.norm();
@@ -176,8 +181,9 @@ std::optional<OtherObject> other_object(std::span<const TargetObservation> obser
 }
 
 std::string other_object_text(const OtherObject& other, std::span<const RigHead> heads) {
-  return "the " + std::to_string(other.num) + " rows of " + rows_text(other, heads) +
-         " are of another object: its ray jumps there by " + text_of(other.jump_rad * 180.0 / std::numbers::pi, 2) +
+  return "the " + std::to_string(other.num) + " rows of " + rows_text(other, heads) + " are of another object" +
+         (other.is_to_an_end ? ", or the head itself was turned" : "") + ": its ray jumps there by " +
+         text_of(other.jump_rad * 180.0 / std::numbers::pi, 2) +
          "°, and without them the others fit, which they do not with them" +
          (other.moved_in_sigma > 1.0 ? " (the track is up to " + text_of(other.moved_in_sigma, 2) + "σ off there)"
                                      : "");

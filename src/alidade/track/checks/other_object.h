@@ -12,6 +12,7 @@ namespace alidade {
 struct OtherObject {
   std::size_t head = 0, num = 0;
   double from_s = 0.0, until_s = 0.0;
+  bool is_to_an_end = false;    ///< Of the log: the head itself may have been moved there.
   double jump_rad = 0.0;        ///< Of the head's ray where they begin or end, the larger one.
   double moved_in_sigma = 0.0;  ///< How far the track is off there, by what it is without them.
 };

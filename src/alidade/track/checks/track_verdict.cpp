@@ -254,12 +254,12 @@ bool is_doubtful(const TrackReport& report) {
 }
 
 Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
-                 std::span<const RigHead> heads, const FollowConfig& config) {
+                 std::span<const RigHead> heads, const FollowConfig& config, bool is_frozen) {
   FollowConfig found = config;
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
   const bool is_explained = is_explained_by_fault(report);
-  if (report.num_starts > 0 && !is_explained && is_doubtful(report))
+  if (report.num_starts > 0 && !is_explained && !is_frozen && is_doubtful(report))
     causes.other = other_object(observations, heads, config, report);
   if (causes.other) return causes;
   if (is_explained && !fits(report)) return causes;
@@ -363,11 +363,11 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   if (seen_by.size() < 2)
     return refused({"one head only: the range along its ray cannot be determined", "add the events of a second head"});
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
-  Causes causes = causes_of(report, observations, heads, config);
+  const auto frozen = frozen_rows(with_shift(observations, {}), heads.size());
+  Causes causes = causes_of(report, observations, heads, config, frozen.has_value());
   causes.step_s = step_that_explains(observations, report, causes.shift);
   if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
   Verdict verdict;
-  const auto frozen = frozen_rows(with_shift(observations, {}), heads.size());
   if (frozen)
     verdict.checks.push_back(
         check("frozen", State::care, frozen_text(*frozen, heads), static_cast<double>(frozen->num), 0.0, "rows"));

@@ -46,6 +46,10 @@ struct PixelScale {
     const Eigen::Vector2d c = normalised(k_px.tail<2>());
     return {k_px[0] / scale, k_px[1] / scale, c.x(), c.y()};
   }
+  /// And back.
+  [[nodiscard]] Eigen::Vector4d intrinsics_px(const Eigen::Vector4d& k) const {
+    return {scale * k[0], scale * k[1], scale * k[2] + centre.x(), scale * k[3] + centre.y()};
+  }
 };
 
 ALIDADE_PUBLIC_END

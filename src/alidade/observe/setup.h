@@ -31,6 +31,8 @@ void check_rotation_words(const ObserveSetup& setup, const RotationLog& log);
 [[nodiscard]] bool ObserveNuisances::*nuisance_of(const std::string& word);
 /// The word of `estimate` for a cause: "k1,k2", "mount", "scale", "backlash".
 [[nodiscard]] std::string estimate_word_of(const std::string& cause);
+/// A row's time to a hundredth of a second, of whatever epoch: "12.34 s".
+[[nodiscard]] std::string row_time_text(double t_s);
 /// The causes of a word that are errors of the measured rotation; empty: it is none of them.
 [[nodiscard]] std::vector<std::string> rotation_causes_of(const std::string& word);
 

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "alidade/observe/setup.h"
@@ -35,6 +37,11 @@ constexpr std::pair<const char*, const char*> cause_words[] = {{"scale", "encode
                                                                {"focal-drift", "focal length that drifts"}};
 
 }  // namespace
+
+std::string row_time_text(double t_s) {
+  const double digits = std::floor(std::log10(std::max(std::abs(t_s), 1.0))) + 3.0;
+  return text_of(t_s, static_cast<int>(digits)) + " s";
+}
 
 bool ObserveNuisances::*nuisance_of(const std::string& word) {
   for (const auto& [each, member] : nuisance_words) {

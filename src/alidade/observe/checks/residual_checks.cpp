@@ -38,12 +38,6 @@ constexpr const char* step_advice =
     "was the camera or its lens bumped, or the head zeroed anew? part the log there, each part has a mounting of its "
     "own";
 
-/// To a hundredth of a second, of whatever beginning.
-std::string time_text(double t_s) {
-  const double digits = std::floor(std::log10(std::max(std::abs(t_s), 1.0))) + 3.0;
-  return text_of(t_s, static_cast<int>(digits)) + " s";
-}
-
 bool is_zoom(const CauseScore& cause) { return cause.name == "focal length that varies"; }
 
 std::string advice_for(const CauseScore& cause) {
@@ -145,8 +139,8 @@ Check step_check(const MountingStep& step) {
   const double angle_deg = step.rotation_rad.norm() / degree;
   return {std::string("needs ") + step_cause,
           step.is_counted ? State::care : State::bad,
-          "all rows are of one camera if it has a " + std::string(step_cause) + " at " + time_text(step.t_s) + " (" +
-              text_of(angle_deg, 2) + "°): " + step_advice,
+          "all rows are of one camera if it has a " + std::string(step_cause) + " at " + row_time_text(step.t_s) +
+              " (" + text_of(angle_deg, 2) + "°): " + step_advice,
           angle_deg,
           0.0,
           "°",
@@ -250,8 +244,8 @@ std::vector<Check> residual_checks(const ObserveSolution& report) {
   for (std::size_t i = 0; i < std::min(asked.size(), max_named); ++i) {
     const CauseScore& cause = *asked[i];
     std::string text = i == 0 ? "the residuals indicate " : "and ";
-    text += cause.name + (std::isfinite(cause.from_s) ? " at " + time_text(cause.from_s) : "") + " (" + size_of(cause) +
-            "; " + text_of(cause.z, 2) + "σ)";
+    text += cause.name + (std::isfinite(cause.from_s) ? " at " + row_time_text(cause.from_s) : "") + " (" +
+            size_of(cause) + "; " + text_of(cause.z, 2) + "σ)";
     if (i == 0) text += ": " + advice_for(cause);
     const State state = i == 0 && is_zoom(cause) ? State::bad : State::care;
     checks.push_back({"needs " + cause.name, state, text, cause.z, asked_beyond(report), "σ", "residuals"});

@@ -49,6 +49,7 @@ IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
     filter_.forget_points();
     estimate.event = ObserveEvent::new_segment;
   }
+  rejected_step_.setZero();
   if (is_running_) filter_frame(frame, estimate);
   if (!is_running_) bootstrap(frame, estimate);
   if (is_running_) report(frame.t_s, estimate);
@@ -63,7 +64,7 @@ void HybridObserver::bootstrap(const RotationFrame& frame, IntrinsicsEstimate& e
   next_adjustment_s_ = frame.t_s + 0.5 * config_.bootstrap_s;
   if (!adjust_buffer()) return;
   is_running_ = true;
-  last_fit_s_ = frame.t_s;
+  last_fit_s_ = drift_from_s_ = frame.t_s;
   constant_since_s_ = buffer_.frames().front().t_s;
   estimate.event = ObserveEvent::start;
 }
@@ -123,6 +124,9 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
   estimate.point = judgement.point;
   if (estimate.event == ObserveEvent::none) estimate.event = judgement.event;
   if (!judgement.accept) {
+    // An outlier, or the first frame of another camera: the next one will tell.
+    const CommonVector step = filter_.with_added_variance(process_noise(filter_, any_zoom)).step;
+    if (!config_.no_zoom && step.allFinite()) rejected_step_ = step.head<4>();
     if (frame.t_s - last_fit_s_ > restart_after_s) restart(estimate);
     return;
   }
@@ -145,6 +149,7 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
 /// out explains it, that point is not what it was.
 bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   if (drift_frames_ == 0) {
+    drift_from_s_ = last_fit_s_;
     drift_ = {};
     std::fill(point_drift_.begin(), point_drift_.end(), Score{});
   }
@@ -266,6 +271,7 @@ void HybridObserver::report(double t_s, IntrinsicsEstimate& estimate) const {
   estimate.cy = scale * k[3] + config_.scale.centre.y();
   estimate.k1 = filter_.camera().k1;
   estimate.sigma = scale * noise_ratio() * sigma_k_at(filter_.camera(), filter_.layout(), filter_.covariance(), t_s);
+  estimate.sigma = (estimate.sigma.cwiseAbs2() + (scale * rejected_step_).cwiseAbs2()).cwiseSqrt();
 }
 
 HybridObserver::Judgement HybridObserver::judge() {

@@ -104,7 +104,9 @@ class HybridObserver {
   double sigma_px_ = 0.0;  ///< Normalised.
   double next_adjustment_s_ = 0.0;
   double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
-  ConstantSpan constant_span_;                                   ///< The longest before the intrinsics last changed.
+  double drift_from_s_ = 0.0;  ///< The last frame before those whose scores are being added: a zoom may begin after it.
+  Eigen::Vector4d rejected_step_ = Eigen::Vector4d::Zero();  ///< Of fx, fy, cx, cy, as a rejected frame asks for it.
+  ConstantSpan constant_span_;                               ///< The longest before the intrinsics last changed.
   Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, by the last adjustment.
   int frames_since_adjustment_ = 0;
   double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.

@@ -96,9 +96,9 @@ bool HybridObserver::has_zoom_ended() {
   return ((now - before).cwiseAbs().array() < 3.0 * sigma.array()).all();
 }
 
-/// The intrinsics were constant until now.
+/// The intrinsics were constant until now, or until the frames that showed, together, that they are not.
 void HybridObserver::note_constant_span() {
-  const ConstantSpan span{constant_since_s_, last_fit_s_};
+  const ConstantSpan span{constant_since_s_, std::max(constant_since_s_, std::min(last_fit_s_, drift_from_s_))};
   if (span.duration_s() > constant_span_.duration_s()) constant_span_ = span;
 }
 

@@ -16,11 +16,6 @@
 namespace alidade {
 namespace {
 
-Eigen::Vector4d intrinsics_px(const Eigen::Vector4d& k, const PixelScale& scale) {
-  const Eigen::Vector4d px = scale.scale * k;
-  return {px[0], px[1], px[2] + scale.centre.x(), px[3] + scale.centre.y()};
-}
-
 constexpr std::size_t max_cells = 4000000;
 
 /// One run over one log: frames, scale and start made once, then a method, then the reference.
@@ -188,7 +183,7 @@ class Observation {
   }
 
   void set_values(IntrinsicsEstimate& step, const RotatingCamera& camera, double t_s) const {
-    const Eigen::Vector4d k = intrinsics_px(camera.k_at(t_s), report_.scale);
+    const Eigen::Vector4d k = report_.scale.intrinsics_px(camera.k_at(t_s));
     step.fx = k[0];
     step.fy = k[1];
     step.cx = k[2];
@@ -196,7 +191,7 @@ class Observation {
     step.k1 = camera.k1;
   }
 
-  [[nodiscard]] Eigen::Vector4d start_px() const { return intrinsics_px(start_.k, report_.scale); }
+  [[nodiscard]] Eigen::Vector4d start_px() const { return report_.scale.intrinsics_px(start_.k); }
 
   template <typename Observer>
   void run_regression(Observer& observer) {
@@ -315,10 +310,12 @@ class Observation {
         is_observable(report_, bound) ? ObserveSolution::Status::ok : ObserveSolution::Status::unobservable;
   }
 
-  /// The last row, and where all rows are one answer all of them, have the stated σ.
+  /// The last row, and where all rows are one answer all of them, have the stated σ; a filter's other rows what it
+  /// adds.
   void state_steps() {
     const CommonLayout layout(model_cov_.rows() == 4 ? ObserveNuisances{} : config_.nuisances);
     const bool is_one = config_.method == ObserveMethod::batch || config_.rotation != RotationKnowledge::known;
+    if (!is_one) report_.side_checks = state_rows(log_, model_cov_, final_cov_, inflation_, final_.k, report_.steps);
     for (std::size_t k = is_one ? 0 : report_.steps.size() - 1; k < report_.steps.size(); ++k) {
       report_.steps[k].sigma =
           report_.scale.scale * sigma_k_at(final_, layout, CommonMatrix(final_cov_), frames_[k].t_s);
@@ -330,6 +327,7 @@ class Observation {
     const Eigen::VectorXd& inflation = report_.stated.inflation;
     if (inflation.size() >= layout.size) {
       const CommonVector raise = inflation.head(layout.size);
+      inflation_ = raise.head<4>();
       final_cov_ =
           CommonMatrix(raise.asDiagonal() * final_cov_.topLeftCorner(layout.size, layout.size) * raise.asDiagonal());
     }
@@ -387,6 +385,7 @@ class Observation {
   bool constant_at_end_ = false;  ///< The intrinsics that the reference is of last to the end of the log.
   RotatingCamera start_, final_;
   CommonMatrix final_cov_, model_cov_;
+  Eigen::Array4d inflation_ = Eigen::Array4d::Ones();
 };
 
 }  // namespace

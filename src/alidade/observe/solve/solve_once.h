@@ -20,4 +20,11 @@ void add_turns(const RotationLog& log, const std::vector<RotationError>& errors,
 /// Does the bound of the reference allow an answer at all?
 [[nodiscard]] bool is_observable(const ObserveSolution& report, const CommonMatrix& bound);
 
+/// Raises the σ of a filter's rows as that of its last row was, from `model` to `stated` (normalised): by the same
+/// factor (`inflation`) for errors that pixels share, by the same share of the focal length for what is given with a σ;
+/// of rows just before a zoom by the change that came. Returns checks of the changes that the rows followed.
+[[nodiscard]] std::vector<Check> state_rows(const RotationLog& log, const CommonMatrix& model,
+                                            const CommonMatrix& stated, const Eigen::Array4d& inflation,
+                                            const Eigen::Vector4d& last_k, std::vector<IntrinsicsEstimate>& rows);
+
 }  // namespace alidade

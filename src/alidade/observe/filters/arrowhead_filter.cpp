@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace alidade {
@@ -17,7 +18,12 @@ CommonMatrix inverse(const CommonMatrix& symmetric) {
 }  // namespace
 
 ArrowheadFilter::ArrowheadFilter(const ObserveNuisances& nuisances, bool with_depth, std::size_t num_points)
-    : nuisances_(nuisances), layout_(nuisances), with_depth_(with_depth), points_(num_points), seen_(num_points) {
+    : nuisances_(nuisances),
+      layout_(nuisances),
+      with_depth_(with_depth),
+      points_(num_points),
+      seen_(num_points),
+      was_rejected_(num_points) {
   const int n = layout_.size;
   covariance_.setIdentity(n, n);
   precision_.setIdentity(n, n);
@@ -138,6 +144,15 @@ void ArrowheadFilter::observe(const RotationFrame& frame, std::span<const Eigen:
   }
 }
 
+void ArrowheadFilter::observe_again(const RotationFrame& frame, std::span<const Eigen::Vector2d> px) {
+  std::fill(was_rejected_.begin(), was_rejected_.end(), false);
+  for (std::size_t i = 0; i < num_seen_; ++i)
+    was_rejected_[static_cast<std::size_t>(seen_[i].point)] = seen_[i].rejected;
+  observe(frame, px);
+  for (std::size_t i = 0; i < num_seen_; ++i)
+    seen_[i].rejected = was_rejected_[static_cast<std::size_t>(seen_[i].point)];
+}
+
 int ArrowheadFilter::dof() const {
   int count = 0;
   for (std::size_t i = 0; i < num_seen_; ++i) count += seen_[i].rejected ? 0 : 2;
@@ -187,7 +202,14 @@ ArrowheadFilter::Hypothesis ArrowheadFilter::with_added_variance(const CommonVec
     squares += seen.innovation.dot(inverse_cov * seen.innovation);
   }
   const CommonVector step = information.llt().solve(gradient);
-  return {squares - gradient.dot(step), step};
+  return {squares - gradient.dot(step), step, change};
+}
+
+double ArrowheadFilter::left_over(std::size_t i, const Hypothesis& hypothesis) const {
+  const Seen& seen = seen_[i];
+  const PixelByCommon by_common = seen.by_common + seen.through_point * hypothesis.point_change;
+  const Eigen::Vector2d rest = seen.innovation - by_common * hypothesis.step;
+  return rest.dot(seen.inverse_cov * rest);
 }
 
 void ArrowheadFilter::add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information) {

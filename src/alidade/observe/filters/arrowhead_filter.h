@@ -30,6 +30,8 @@ class ArrowheadFilter {
   void predict(const CommonVector& variance, double rotation_sigma_rad);
   /// Linearises a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
   void observe(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
+  /// The same frame after `predict`: what was rejected stays so.
+  void observe_again(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
   /// Number of innovations; index `i` below is of this list.
   [[nodiscard]] std::size_t num_seen() const { return num_seen_; }
   [[nodiscard]] int seen_point(std::size_t i) const { return seen_[i].point; }
@@ -45,8 +47,11 @@ class ArrowheadFilter {
   struct Hypothesis {
     double nis = 0.0;
     CommonVector step;
+    CommonMatrix point_change;  ///< What the points' slopes are multiplied by, less the identity.
   };
   [[nodiscard]] Hypothesis with_added_variance(const CommonVector& variance) const;
+  /// What the step leaves of a point's innovation, squared over its variance.
+  [[nodiscard]] double left_over(std::size_t i, const Hypothesis& hypothesis) const;
   /// NIS of one point alone, 2 degrees of freedom.
   [[nodiscard]] double point_nis(std::size_t i) const;
   /// Adds the score of fx, fy, cx, cy, Gᵀ S⁻¹ ν, and its covariance Gᵀ S⁻¹ G: zero on the mean while nothing changes.
@@ -95,6 +100,7 @@ class ArrowheadFilter {
   CommonMatrix covariance_, precision_;  ///< Of the shared parameters, and its inverse.
   std::vector<Point> points_;
   std::vector<Seen> seen_;
+  std::vector<bool> was_rejected_;  ///< One per point.
   std::size_t num_seen_ = 0;
   RotationFrame frame_;
   std::span<const Eigen::Vector2d> px_;

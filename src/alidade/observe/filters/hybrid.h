@@ -70,6 +70,7 @@ class HybridObserver {
   [[nodiscard]] Judgement judge();
   bool reject_until(double gate_z, Judgement& judgement);
   [[nodiscard]] bool is_zoom(const RotationFrame& frame);
+  bool reject_until_zoomed();
   void jump(ArrowheadFilter& filter, const RotationFrame& frame) const;
   void begin_zoom();
   [[nodiscard]] bool has_drifted(IntrinsicsEstimate& estimate);

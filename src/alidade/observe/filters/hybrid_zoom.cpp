@@ -1,6 +1,8 @@
 // How the hybrid observer distinguishes a zoom from noise, follows it, and sees that it is over.
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "alidade/observe/filters/hybrid.h"
 
@@ -35,10 +37,8 @@ void HybridObserver::learn_zoom_process_noise(const Eigen::Vector4d& k_before) {
 /// A frame that does not fit: would it fit another camera? Two frames in a row must want the same one, or each one of
 /// its own, so exactly that chance does not do it; during a zoom one frame will do.
 bool HybridObserver::is_zoom(const RotationFrame& frame) {
-  const int left = std::max(filter_.dof() - 4, 0);
-  const double gate = left > 0 ? chi2_quantile(left, gate_z) : 1.0;
-  const bool fits_another = filter_.with_added_variance(process_noise(filter_, any_zoom)).nis <= gate;
-  const bool fits_clearly = fits_another && left >= clearly_left;
+  const bool fits_another = reject_until_zoomed();
+  const bool fits_clearly = fits_another && filter_.dof() - 4 >= clearly_left;
   if (has_candidate_ && !is_zooming_) {
     candidate_.predict(process_noise(candidate_, 1.0), 0.0);
     candidate_.observe(frame, px_);
@@ -62,6 +62,28 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
   return false;
 }
 
+/// Rejects the points that fit another camera worst, one by one, until the rest fits it: at most a fifth, as all points
+/// of an outlier frame fit none. False, with none rejected: no other camera.
+bool HybridObserver::reject_until_zoomed() {
+  const std::size_t seen = filter_.num_seen(), most = seen / 5;
+  for (std::size_t out = 0;; ++out) {
+    const int left = std::max(filter_.dof() - 4, 0);
+    const ArrowheadFilter::Hypothesis zoomed = filter_.with_added_variance(process_noise(filter_, any_zoom));
+    if (zoomed.nis <= (left > 0 ? chi2_quantile(left, gate_z) : 1.0)) return true;
+    if (out >= most || !std::isfinite(zoomed.nis)) break;
+    std::size_t worst = seen;
+    double largest = -1.0;
+    for (std::size_t i = 0; i < seen; ++i) {
+      const double rest = filter_.is_rejected(i) ? -1.0 : filter_.left_over(i, zoomed);
+      if (rest > largest) std::tie(largest, worst) = std::pair(rest, i);
+    }
+    if (worst == seen) break;
+    filter_.set_rejected(worst, true);
+  }
+  for (std::size_t i = 0; i < seen; ++i) filter_.set_rejected(i, false);
+  return false;
+}
+
 /// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
 /// make a drift of 1 px as noisy as one frame is.
 void HybridObserver::jump(ArrowheadFilter& filter, const RotationFrame& frame) const {
@@ -70,7 +92,7 @@ void HybridObserver::jump(ArrowheadFilter& filter, const RotationFrame& frame) c
   CommonVector variance = process_noise(filter, 4.0);
   variance.head<4>() += step.head<4>().cwiseAbs2();
   filter.predict(variance, 0.0);
-  filter.observe(frame, px_);
+  filter.observe_again(frame, px_);
 }
 
 void HybridObserver::begin_zoom() {

@@ -17,6 +17,15 @@ void raise_sigma(const CommonMatrix& model, const CommonMatrix& stated, const Ei
 
 }  // namespace
 
+std::optional<Eigen::Vector4d> intrinsics_before(double until_s, const RotationLog& log,
+                                                 const std::vector<IntrinsicsEstimate>& rows) {
+  std::optional<Eigen::Vector4d> k;
+  if (!(until_s < log.rows.back().t_s)) return k;
+  for (std::size_t row = 0; row < rows.size() && log.rows[row].t_s <= until_s; ++row)
+    if (rows[row].has_value) k = rows[row].values();
+  return k;
+}
+
 std::vector<Check> state_rows(const RotationLog& log, const CommonMatrix& model, const CommonMatrix& stated,
                               const Eigen::Array4d& inflation, const Eigen::Vector4d& last_k,
                               std::vector<IntrinsicsEstimate>& rows) {

@@ -254,6 +254,8 @@ class Observation {
     AdjustConfig config = adjust_config_of(log_, config_, start_, report_.scale);
     if (has_final_ && config_.method != ObserveMethod::fang2011) {
       config.start = final_;
+      if (const auto k = intrinsics_before(report_.reference_until_s, log_, report_.steps))
+        config.start.k = report_.scale.normalised_intrinsics(*k);
       config.start.rotation_error_rad.setZero();
       config.other_starts.clear();
     }

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "alidade/observe/solve/solve.h"
 
 namespace alidade {
@@ -19,6 +22,10 @@ void add_turns(const RotationLog& log, const std::vector<RotationError>& errors,
 
 /// Does the bound of the reference allow an answer at all?
 [[nodiscard]] bool is_observable(const ObserveSolution& report, const CommonMatrix& bound);
+
+/// fx, fy, cx, cy [px] of the last row until then; none at the end of the log, or where no row has any.
+[[nodiscard]] std::optional<Eigen::Vector4d> intrinsics_before(double until_s, const RotationLog& log,
+                                                               const std::vector<IntrinsicsEstimate>& rows);
 
 /// Raises the σ of a filter's rows as that of its last row was, from `model` to `stated` (normalised): by the same
 /// factor (`inflation`) for errors that pixels share, by the same share of the focal length for what is given with a σ;

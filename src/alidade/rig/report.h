@@ -31,7 +31,7 @@ struct RigBoard {
   Rigid3 world_from_board;
 };
 
-/// Beyond so many σ a cause is indicated: of thirty that are tested, one clean rig in a thousand is above.
+/// Beyond so many σ a cause is indicated: of forty that are tested, one clean rig in a thousand is above.
 inline constexpr double rig_cause_limit = 4.2;
 /// A parameter freed without need only costs σ: so a lower threshold, exceeded by one clean rig in seven.
 inline constexpr double rig_free_limit = 2.6, rig_free_joint_limit = 2.6;
@@ -51,10 +51,15 @@ struct HeadCover {
 
 /// A parameter that the residuals indicate to be free: by how many σ, and its value (a score test).
 struct RigCause {
-  std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn", "all scales"
+  std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn", "all scales", "head1.pan zero drift"
   double size = 0.0;
   std::string unit;
   double sigmas = 0.0;
+
+  /// Of a head's base, or of a zero, over the views as they were taken.
+  [[nodiscard]] bool is_drift() const { return name.ends_with(" drift"); }
+  /// Of a lens, beyond what its file says.
+  [[nodiscard]] bool is_distortion() const { return name.ends_with("camera.k1"); }
 };
 
 /// Something that was estimated because the residuals indicated it.

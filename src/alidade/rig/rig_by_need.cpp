@@ -128,11 +128,16 @@ class ByNeed {
     constexpr double near = 0.5;  // of the largest: what one cause does looks to another's score like itself
     std::vector<Candidate> candidates;
     if (best_.causes.empty()) return candidates;
-    const double largest = std::ranges::max_element(best_.causes, {}, &RigCause::sigmas)->sigmas;
+    const RigCause& first = *std::ranges::max_element(best_.causes, {}, &RigCause::sigmas);
+    const auto has_no_parameter = [](const RigCause& cause) { return cause.is_drift() || cause.is_distortion(); };
+    // It is named, and nothing else absorbs it.
+    if (has_no_parameter(first) && first.sigmas > rig_cause_limit) return candidates;
+    const double largest = first.sigmas;
     for (const RigCause& cause : best_.causes) {
-      const bool is_joint = cause.name.starts_with("all ");  // five of thirty, and the ones that see most
+      const bool is_joint = cause.name.starts_with("all ");  // six of forty, and the ones that see most
       if (cause.sigmas < (is_joint ? rig_free_joint_limit : rig_free_limit)) continue;
       if (cause.sigmas < near * largest) continue;
+      if (has_no_parameter(cause)) continue;
       Candidate next = candidate_of(cause, best_.rig);
       const bool is_new = num_of(with(freed_, next)) > num_of(freed_);
       if (is_new && candidates.size() < 8) candidates.push_back(std::move(next));

@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index tested_a_head = 15;
+constexpr Index tested_a_head = 24;
 
 /// Something that could be free: its columns among all that are tested.
 struct Tested {
@@ -25,8 +25,10 @@ struct Tested {
   double worst = 1.0;  ///< σ of its size beyond which the views do not determine it: 5σ would be implausible.
 };
 
-/// Indices of a head's columns: lens, then for each axis scale, one period, two periods, backlash.
+/// Indices of a head's columns: lens, then for each axis scale, one period, two periods, backlash; the drifts of the
+/// base's position and rotation, and of each axis' zero.
 constexpr Index column_of_axis(int axis) { return 3 + 6 * axis; }
+constexpr Index base_drift_column = 15, zero_drift_column = 21, distortion_column = 23;
 
 /// One by one: of these only what is fixed.
 std::vector<Tested> single_tests(const RigProblem& problem, const RigState& state) {
@@ -43,6 +45,7 @@ std::vector<Tested> single_tests(const RigProblem& problem, const RigState& stat
     add("camera.fx", "px", focal_param, {0});
     add("camera.cx", "px", centre_x_param, {1});
     add("camera.cy", "px", centre_y_param, {2});
+    add("camera.k1", "", -1, {distortion_column});
     for (const int axis : {0, 1}) {
       const std::string name = axis == 0 ? "pan" : "tilt";
       const Index at = column_of_axis(axis);
@@ -50,7 +53,10 @@ std::vector<Tested> single_tests(const RigProblem& problem, const RigState& stat
       add(name + " once a turn", "rad", pan_cos_param + 2 * axis, {at + 1, at + 2});
       add(name + " twice a turn", "rad", -1, {at + 3, at + 4});
       add(name + " backlash", "rad", pan_backlash_param + axis, {at + 5});
+      add(name + " zero drift", "rad", -1, {zero_drift_column + axis});
     }
+    add("position drift", "m", -1, {base_drift_column, base_drift_column + 1, base_drift_column + 2});
+    add("rotation drift", "rad", -1, {base_drift_column + 3, base_drift_column + 4, base_drift_column + 5});
   }
   return all;
 }
@@ -60,6 +66,7 @@ std::vector<Tested> tested_of(const RigProblem& problem, const RigState& state) 
   std::vector<Tested> all = single_tests(problem, state);
   const std::size_t num_single = all.size();
   for (const auto& [ending, name] : {std::pair{"_scale", "scales"},
+                                     {"camera.k1", "camera.k1"},
                                      {" once a turn", "once a turn"},
                                      {" backlash", "backlash"},
                                      {"camera.fx", "camera.fx"},
@@ -87,19 +94,24 @@ MatrixXd tested_columns(const RigProblem& problem, const RigState& state, std::s
   const GivenColumns given = given_columns(problem, state, v);
   const VectorXd lens = params(state.heads[problem.views[v].head].camera.lens);
   MatrixXd D(given.square.size(), tested_a_head);
+  // From −½ to ½ over the table: what drifts does so by as much as its size; a step half-way is nearly as visible.
+  const double time = (static_cast<double>(v) + 0.5) / static_cast<double>(problem.views.size()) - 0.5;
   D.col(0) = given.lens.col(0) + lens[1] / lens[0] * given.lens.col(1);
   D.col(1) = given.lens.col(2);
   D.col(2) = given.lens.col(3);
   for (const int axis : {0, 1}) {
     const double reading_rad = problem.views[v].view->pan_tilt_rad[axis];
-    const Index at = 3 + 6 * axis;
+    const Index at = column_of_axis(axis);
     D.col(at) = axis == 0 ? given.pan : given.tilt;
     for (const int turns : {1, 2}) {
       D.col(at + 2 * turns - 1) = std::cos(turns * reading_rad) * given.readings.col(axis);
       D.col(at + 2 * turns) = std::sin(turns * reading_rad) * given.readings.col(axis);
     }
     D.col(at + 5) = -problem.views[v].travel[axis] * given.readings.col(axis);
+    D.col(zero_drift_column + axis) = time * given.readings.col(axis);
   }
+  D.col(distortion_column) = given.distortion;
+  D.middleCols<6>(base_drift_column) = time * given.base;
   return D;
 }
 

@@ -154,6 +154,79 @@ TEST(RigTable, AnglesOfTheViewBeforeOfOneHeadAreNamed) {
                });
 }
 
+/// Lenses bend by a k1 of −0.015 that their files, a pinhole's, do not have: a pixel at the image's corners.
+TEST(RigTable, DistortionThatALensDoesNotHaveIsNamed) {
+  RigSceneConfig config;
+  config.max_views_of_a_board = 6;
+  int named = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const RigScene scene = draw_rig_scene(config, seed);
+    std::vector<HeadView> views = simulate_head_views(scene, {}, seed).views;
+    const Eigen::VectorXd lens = params(scene.rig.heads[0].camera.lens);
+    for (HeadView& view : views) {
+      for (Corner& corner : view.seen.corners) {
+        const Eigen::Vector2d out = corner.px - lens.segment<2>(2);
+        corner.px -= 0.015 * (out / lens[0]).squaredNorm() * out;
+      }
+    }
+    RigConfig exact;
+    exact.sigma_square_m = exact.sigma_scale = 1e-9;
+    const RigReport report =
+        calibrate_rig_by_need(views, points_in_board(scene.board), testing::cameras_of(scene.rig), exact, {});
+    const Verdict verdict = rig_verdict(report, exact);
+    EXPECT_NE(verdict.state, State::good) << seed << ": " << verdict.sentence;
+    named += verdict.to_add.find("camera.k1") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GE(named, 3);
+}
+
+/// What happens to a head while its views are taken is named: never a good verdict over an error above 5σ.
+void expect_drift_named(const std::function<void(const RigScene&, double, HeadView&)>& change) {
+  RigSceneConfig config;
+  config.max_views_of_a_board = 6;
+  constexpr std::uint64_t draws = 6;
+  int named = 0;
+  for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+    const RigScene scene = draw_rig_scene(config, seed);
+    std::vector<HeadView> views = simulate_head_views(scene, {}, seed).views;
+    for (std::size_t v = 0; v < views.size(); ++v)
+      if (views[v].head == 1) change(scene, static_cast<double>(v) / static_cast<double>(views.size()), views[v]);
+    RigConfig exact;
+    exact.sigma_square_m = exact.sigma_scale = 1e-9;
+    const RigReport report =
+        calibrate_rig_by_need(views, points_in_board(scene.board), testing::cameras_of(scene.rig), exact, {});
+    const Verdict verdict = rig_verdict(report, exact);
+    EXPECT_NE(verdict.state, State::good) << seed << ": " << verdict.sentence;
+    named += verdict.to_add.find(" drift from the first view to the last") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GE(named, 5);
+}
+
+TEST(RigTable, AZeroThatCreepsIsNamed) {
+  expect_drift_named([](const RigScene&, double time, HeadView& view) {
+    view.pan_tilt_rad += Eigen::Vector2d(0.5, 0.2) * time * degree;
+  });
+}
+
+/// Its tripod was knocked in the middle.
+TEST(RigTable, AHeadThatMovedIsNamed) {
+  expect_drift_named([](const RigScene& scene, double time, HeadView& view) {
+    if (time < 0.5) return;
+    RigHead moved = scene.rig.heads[0];
+    moved.head.world_from_base =
+        moved.head.world_from_base.retract(Eigen::Vector<double, 6>(0.003, 0.001, 0.003, 0.001, 0.005, 0.002));
+    const std::vector<Eigen::Vector3d> points = points_in_board(scene.board);
+    for (Corner& corner : view.seen.corners) {
+      const Eigen::Vector3d at =
+          scene.world_from_board[static_cast<std::size_t>(view.board)] * points[static_cast<std::size_t>(corner.index)];
+      const auto before = project(scene.rig.heads[0], view.pan_tilt_rad, at);
+      const auto after = project(moved, view.pan_tilt_rad, at);
+      ASSERT_TRUE(before && after);
+      corner.px += after->px - before->px;
+    }
+  });
+}
+
 /// Between the views of the first head and those of the second it was moved by 3 cm.
 TEST(RigTable, ABoardThatMovedIsNamed) {
   RigSceneConfig config;

@@ -203,6 +203,15 @@ std::optional<double> counted_sigma_scale(const RigConfig& config) {
   return std::hypot(*config.sigma_scale, slope_of_waves * config.sigma_within_turn_rad);
 }
 
+namespace {
+
+/// ∂ pixel / ∂ k1 of a factor 1 + k1 r² about the centre of the image.
+Eigen::Vector2d by_radial_term(const Eigen::VectorXd& lens, const Eigen::Vector2d& px, const Eigen::Vector3d& p) {
+  return p.head<2>().squaredNorm() / (p.z() * p.z()) * (px - lens.segment<2>(2));
+}
+
+}  // namespace
+
 GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t v) {
   const RigView& which = problem.views[v];
   const HeadView& given = *which.view;
@@ -216,10 +225,15 @@ GivenColumns given_columns(const RigProblem& problem, const RigState& state, std
     points_in_cam.push_back(
         turned.point_in_cam(world_from_board * problem.points_in_board[static_cast<std::size_t>(corner.index)]));
   const auto seen = project_with_jacobians(rig_head.camera, points_in_cam);
+  const Eigen::VectorXd lens = params(rig_head.camera.lens);
   const auto rows = static_cast<Index>(2 * seen.size() + 2);
-  GivenColumns columns{Eigen::MatrixXd::Zero(rows, params(rig_head.camera.lens).size()), Eigen::VectorXd::Zero(rows),
-                       Eigen::VectorXd::Zero(rows), Eigen::VectorXd::Zero(rows),
-                       Eigen::Matrix<double, Eigen::Dynamic, 2>::Zero(rows, 2)};
+  GivenColumns columns{Eigen::MatrixXd::Zero(rows, lens.size()),
+                       Eigen::VectorXd::Zero(rows),
+                       Eigen::VectorXd::Zero(rows),
+                       Eigen::VectorXd::Zero(rows),
+                       Eigen::VectorXd::Zero(rows),
+                       Eigen::Matrix<double, Eigen::Dynamic, 2>::Zero(rows, 2),
+                       Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(rows, 6)};
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!seen[i]) continue;
     const auto row = static_cast<Index>(2 * i);
@@ -227,9 +241,11 @@ GivenColumns given_columns(const RigProblem& problem, const RigState& state, std
     const Eigen::Vector3d& point_in_board =
         problem.points_in_board[static_cast<std::size_t>(given.seen.corners[i].index)];
     columns.lens.middleRows<2>(row) = seen[i]->J_px_params / problem.sigma_px;
+    columns.distortion.segment<2>(row) = by_radial_term(lens, seen[i]->px, points_in_cam[i]) / problem.sigma_px;
     columns.square.segment<2>(row) = J * (cam_from_board_rotation * point_in_board);
     columns.readings.middleRows<2>(row) = J * turned.J_point_readings(points_in_cam[i]);
     const auto by_head = turned.J_point_head(points_in_cam[i]);
+    columns.base.middleRows<2>(row) = J * by_head.leftCols<6>();
     columns.pan.segment<2>(row) = J * by_head.col(pan_scale_param);
     columns.tilt.segment<2>(row) = J * by_head.col(tilt_scale_param);
   }

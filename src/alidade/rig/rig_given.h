@@ -11,11 +11,13 @@
 namespace alidade {
 
 /// Derivatives of a view's whitened residuals by what is given: its lens, the board's size (relative), the scales; and
-/// by the readings.
+/// by the readings and the pose of its head's base.
 struct GivenColumns {
-  Eigen::MatrixXd lens;  ///< As many columns as the lens has parameters.
+  Eigen::MatrixXd lens;        ///< As many columns as the lens has parameters.
+  Eigen::VectorXd distortion;  ///< By a radial term of third order, k1 r², added to whatever the lens has.
   Eigen::VectorXd square, pan, tilt;
   Eigen::Matrix<double, Eigen::Dynamic, 2> readings;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> base;
 };
 [[nodiscard]] GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t view);
 

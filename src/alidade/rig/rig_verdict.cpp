@@ -105,6 +105,8 @@ Check check_of(std::string name, State state, std::string text, double value, do
 std::string views_lacking(const RigReport& report) {
   const double times =
       std::max(report.sigma_relative_rad / good_relative_rad, report.sigma_relative_m / good_relative_m);
+  constexpr double most_times = 3.0;  // nine times as many views: nobody takes these
+  if (times > most_times) return "; more views alone do not suffice: boards nearer or larger, at more pans and tilts";
   const double lacking = std::ceil(static_cast<double>(report.views.size()) * (times * times - 1.0));
   return "; add about " + text_of(lacking, 6) + (lacking < 1.5 ? " view" : " views") +
          ": boards at other positions, seen from more pans and tilts";
@@ -195,11 +197,16 @@ void add_causes(const RigReport& report, Verdict& verdict) {
     if (asked->sigmas < most && cause.sigmas > asked->sigmas) asked = &cause;
   const RigCause& first = *asked;
   const bool is_quiet = first.sigmas < most;
+  const std::string by = ", by " + text_of(first.size, 2) + (first.unit.empty() ? "" : " " + first.unit) + " (" +
+                         text_of(first.sigmas, 2) + "σ)";
+  const std::string indicated = first.is_drift() ? "the residuals indicate a " + first.name +
+                                                       " from the first view to the last" + by +
+                                                       ": a head that was moved (two show it against each other only), "
+                                                       "or a zero that creeps; take the views again"
+                                                 : "the residuals indicate another " + first.name + by;
   verdict.checks.push_back(
       check_of("causes", is_quiet ? State::good : State::care,
-               is_quiet ? "other lenses, scales, eccentricities and backlash are not indicated"
-                        : "the residuals indicate another " + first.name + ", by " + text_of(first.size, 2) +
-                              (first.unit.empty() ? "" : " " + first.unit) + " (" + text_of(first.sigmas, 2) + "σ)",
+               is_quiet ? "other lenses, scales, eccentricities, backlash and drifts are not indicated" : indicated,
                first.sigmas, most, "σ"));
 }
 
@@ -251,7 +258,13 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   const auto first = [&](State state) {
     return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
   };
-  const auto refused = first(State::refused), care = first(State::care);
+  const auto refused = first(State::refused);
+  auto care = first(State::care);
+  // More views of the same do not remove a cause: it is named before what they lack.
+  for (const char* cause : {"estimated", "causes"}) {
+    const auto named = std::ranges::find(verdict.checks, cause, &Check::name);
+    if (named != verdict.checks.end() && named->state == State::care) care = named;
+  }
   if (refused != verdict.checks.end()) {
     const std::vector<Check> checks = verdict.checks;
     verdict = refused->name == "outliers" ? rig_refusal(State::not_converged, ExitCode::no_convergence,

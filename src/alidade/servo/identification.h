@@ -111,6 +111,12 @@ struct HiddenFlaw {
   double size = 0.0, gain_factor = 1.0;
 };
 
+/// From a row on the encoder reads by so much more: a coupling that slipped, a counter that lost or gained pulses.
+struct ZeroSlip {
+  std::size_t row = 0;
+  double t_s = 0.0, size_rad = 0.0, sigma_rad = 0.0;
+};
+
 /// A nonlinearity assumed absent, its typical size, and the effect on the gain beside the log's information.
 struct CountedFlaw {
   std::size_t flaw = 0;
@@ -135,7 +141,9 @@ struct ServoIdentification {
   std::vector<double> command_t_s;   ///< Where commands were given before their rows: each row's, as estimated.
   std::size_t num_command_times = 0;
   double sigma_command_s = 0.0;  ///< Of what all of them may have been given earlier, which no log shows; in the σ.
-  double lag_one_correlation = 0.0;  ///< Of the residuals, one row to the next: near 0 where the model is enough.
+  std::vector<std::size_t> lost_commands;  ///< Rows whose command the axis did not follow; the one before held on.
+  std::vector<ZeroSlip> slips;             ///< Of the encoder's zero, estimated with the fit.
+  double lag_one_correlation = 0.0;        ///< Of the residuals, one row to the next: near 0 where the model is enough.
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };
 

@@ -20,64 +20,6 @@
 namespace alidade {
 namespace {
 
-/// exp(−dt/τ) and 1 − exp(−dt/τ) over the steps of a log: a regular one has two lengths, but for rounding.
-class Decay {
- public:
-  explicit Decay(double tau_s) : tau_s_(tau_s) {}
-  struct Values {
-    double dt_s = -1.0, decay = 1.0, rise = 0.0;
-  };
-  Values over(double dt_s) {
-    constexpr double rounding = 1e-9;  // of τ: its square is lost in a double
-    for (const Values& known : known_) {
-      const double by = (dt_s - known.dt_s) / tau_s_;
-      if (std::abs(by) < rounding) return {dt_s, known.decay - known.decay * by, known.rise + known.decay * by};
-    }
-    std::swap(known_[0], known_[1]);
-    return known_[0] = {dt_s, std::exp(-dt_s / tau_s_), -std::expm1(-dt_s / tau_s_)};
-  }
-
- private:
-  double tau_s_;
-  std::array<Values, 2> known_{};
-};
-
-/// Angle and rate of a plant of gain one half-way through a log, with their derivatives by the parameters.
-struct Walk {
-  ServoKind kind;
-  double gain, tau_s;
-  Decay decays{tau_s};
-  double x = 0.0, v = 0.0;  ///< Angle without its zero; rate (rate plants).
-  Eigen::RowVector<double, num_servo_params> dx = Eigen::RowVector<double, num_servo_params>::Zero(), dv = dx;
-
-  /// dt under one command: of an angle plant x, of a rate plant v goes towards gain · command.
-  void advance(double dt_s, double command) {
-    const auto [step_s, decay, rise] = decays.over(dt_s);
-    const double goal = gain * command;
-    const double decay_by_tau = decay * dt_s / (tau_s * tau_s);
-    if (kind == ServoKind::angle) {
-      dx *= decay;
-      dx[ServoParam::gain] += rise * command;
-      dx[ServoParam::tau] += decay_by_tau * (x - goal);
-      x = goal + decay * (x - goal);
-      return;
-    }
-    const double gap = v - goal, reach_s = tau_s * rise;
-    dx += reach_s * dv;
-    dx[ServoParam::gain] += (dt_s - reach_s) * command;
-    dx[ServoParam::tau] += (rise - tau_s * decay_by_tau) * gap;
-    dv *= decay;
-    dv[ServoParam::gain] += rise * command;
-    dv[ServoParam::tau] += decay_by_tau * gap;
-    x += goal * dt_s + gap * reach_s;
-    v = goal + decay * gap;
-  }
-  /// A switch a little later: what pulled before goes on a little longer.
-  void switch_command(double from, double to) {
-    (kind == ServoKind::angle ? dx : dv)[ServoParam::latency] += gain * (from - to) / tau_s;
-  }
-};
-
 /// Gain, zero and start that fit best at a time constant and latency, and what is left.
 struct LinearFit {
   ServoParams params = ServoParams::Zero();
@@ -194,6 +136,10 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
     const Eigen::Index at = num_servo_params + static_cast<Eigen::Index>(i);
     fit.flaw_sigma[fit.freed[i]] = std::sqrt(cov(at, at));
   }
+  for (std::size_t i = 0; i < result.slips.size(); ++i) {
+    const auto at = num_servo_params + static_cast<Eigen::Index>(fit.freed.size() + i);
+    result.slips[i].sigma_rad = std::sqrt(cov(at, at));
+  }
   count_ordinary_flaws(log, J, *inverse, result);
   count_time_stamps(log, J, *inverse, result);
 }
@@ -213,43 +159,6 @@ std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const
   const bool is_of_log = std::ranges::all_of(indicated, is_of_the_log);
   return is_of_log ? indicated : all;
 }
-
-}  // namespace
-
-ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
-  const std::vector<double> times_s = reading_times(log);
-  const auto num_rows = static_cast<Eigen::Index>(times_s.size());
-  ServoResponse response{Eigen::VectorXd(num_rows), decltype(response.J)(num_rows, num_servo_params)};
-  Walk walk{kind, params[ServoParam::gain], params[ServoParam::tau]};
-  if (kind == ServoKind::angle) {
-    walk.x = params[ServoParam::start];
-    walk.dx[ServoParam::start] = 1.0;
-  } else {
-    walk.v = params[ServoParam::start];
-    walk.dv[ServoParam::start] = 1.0;
-  }
-  double now_s = std::min(log.front().t_s, times_s.front()), command = log.front().command;
-  std::size_t next = 1;  // the first command has been there before
-  for (Eigen::Index i = 0; i < num_rows; ++i) {
-    const double t_s = times_s[static_cast<std::size_t>(i)];
-    for (; next < log.size() && log[next].given_s() + params[ServoParam::latency] <= t_s; ++next) {
-      if (log[next].command == command) continue;
-      const double switch_s = log[next].given_s() + params[ServoParam::latency];
-      walk.advance(switch_s - now_s, command);
-      walk.switch_command(command, log[next].command);
-      now_s = switch_s;
-      command = log[next].command;
-    }
-    walk.advance(t_s - now_s, command);
-    now_s = t_s;
-    response.angle_rad[i] = params[ServoParam::zero] + walk.x;
-    response.J.row(i) = walk.dx;
-    response.J(i, ServoParam::zero) = 1.0;
-  }
-  return response;
-}
-
-namespace {
 
 /// The index of the selected one of two fits, angle and rate.
 std::size_t believed_of(const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
@@ -279,6 +188,8 @@ struct Solution {
   std::array<std::vector<ServoRival>, 2> rivals;
   std::size_t believed = 0;
   std::optional<CommandTimes> times;
+  std::vector<std::size_t> lost_commands;
+  std::vector<ZeroSlip> slips;
 
   [[nodiscard]] const ServoFit& fit() const { return fits[believed]; }
 };
@@ -309,7 +220,7 @@ void try_gain_by_sign(std::span<const ServoSample> log, std::span<const std::siz
 }
 
 Solution with_flaws_tried(std::vector<ServoSample> log, const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
-  Solution solution{std::move(log), fits, {}, 0, std::nullopt};
+  Solution solution{std::move(log), fits, {}, 0, std::nullopt, {}, {}};
   // Where one kind explains the log as it is, the other is not made to.
   const std::vector<std::size_t> tried = indicated_flaws(solution.log, fits[believed_of(fits, rule)]);
   for (std::size_t kind = 0; kind < 2 && !tried.empty(); ++kind) {
@@ -327,12 +238,99 @@ double evidence_of_flaws(double rows, const ServoFit& plain, const ServoFit& fla
          static_cast<double>(flawed.freed.size()) * std::log(rows);
 }
 
-/// As logged; or with commands that were given before their rows, if they explain more than flaws of the axis do.
+bool is_white(std::span<const ServoSample> log, const ServoFit& fit) {
+  constexpr double max_correlation = 0.3;
+  const Eigen::VectorXd misfit = flawed_misfit(log, fit);
+  return std::abs(lag_one({misfit.data(), misfit.data() + misfit.size()})) < max_correlation;
+}
+
+double price_of_faults(std::span<const ServoSample> log, const Solution& solution) {
+  const double one = std::log(static_cast<double>(readings_of(log).size()));
+  const std::size_t lost = solution.lost_commands.size();
+  return 3.0 * one * static_cast<double>(solution.slips.size()) + (lost > 0 ? price_of_lost(log, lost) + one : 0.0);
+}
+
+/// A solution of the log as the axis had it, and 2 ln of its likelihood ratio less its price.
+struct Explained {
+  Solution solution;
+  double evidence = 0.0;
+};
+Explained explained(const Solution& before, std::vector<ServoSample> log, ServoKindRule rule, double price) {
+  const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
+                                     refined(log, ServoKind::rate, searched(log, ServoKind::rate).params)};
+  Explained found{with_flaws_tried(std::move(log), fits, rule)};
+  const ServoFit& fit = found.solution.fit();
+  const double rows = effective_rows(flawed_misfit(found.solution.log, fit));
+  const double more = static_cast<double>(fit.freed.size()) - static_cast<double>(before.fit().freed.size());
+  found.evidence = 2.0 * rows * std::log(before.fit().rms_rad / fit.rms_rad) - more * std::log(rows) - price;
+  found.solution.times = before.times;
+  found.solution.lost_commands = before.lost_commands;
+  found.solution.slips = before.slips;
+  return found;
+}
+
+/// The slip that is left from this fit on, which follows it.
+std::optional<ZeroSlip> settled_slip(std::span<const ServoSample> log, ServoFit fit) {
+  constexpr int rounds = 4, max_steps = 10;
+  std::optional<ZeroSlip> slip = zero_slip(log, fit);
+  for (int round = 0; round < rounds && slip; ++round) {
+    refine_flawed(without_faults(log, {}, {*slip}), max_steps, fit);
+    slip = zero_slip(log, fit);
+  }
+  return slip;
+}
+
+/// Lost commands or a slip of the encoder's zero, whichever explains more; no evidence where neither is found.
+Explained with_a_fault(const Solution& before, ServoKindRule rule) {
+  Explained best{before};
+  const double rows = static_cast<double>(readings_of(before.log).size());
+  const auto keep_better = [&](Explained trial) {
+    if (trial.evidence > best.evidence) best = std::move(trial);
+  };
+  const bool may_be_lost = before.lost_commands.empty() && !before.times && !is_white(before.log, before.fit());
+  for (const ServoKind kind : {ServoKind::angle, ServoKind::rate}) {
+    const std::vector<std::size_t> lost = may_be_lost ? lost_commands(before.log, kind) : std::vector<std::size_t>();
+    if (lost.empty()) continue;
+    Explained trial = explained(before, without_faults(before.log, lost, {}), rule,
+                                price_of_lost(before.log, lost.size()) + std::log(rows));
+    trial.solution.lost_commands = lost;
+    keep_better(std::move(trial));
+  }
+  ServoFit plain = before.fit();
+  plain.flaws = {};
+  plain.freed.clear();
+  for (const ServoFit& start : {refined(before.log, plain.kind, plain.params), before.fit()}) {
+    const std::optional<ZeroSlip> slip = settled_slip(before.log, start);
+    if (!slip) continue;
+    Explained trial = explained(before, without_faults(before.log, {}, {*slip}), rule, 3.0 * std::log(rows));
+    if (!zero_slip(before.log, trial.solution.fit())) continue;  // what is estimated since does it as well
+    trial.solution.slips.push_back(*slip);
+    keep_better(std::move(trial));
+  }
+  return best;
+}
+
+/// With what the log has that is none of the axis' doing, where that explains more than flaws of the axis do and leaves
+/// nothing: what an axis does beside the model may look like either.
+Solution with_faults_tried(const Solution& before, ServoKindRule rule) {
+  constexpr double clear = 12.0;
+  constexpr int most = 3;
+  Solution now = before;
+  for (int i = 0; i < most; ++i) {
+    Explained next = with_a_fault(now, rule);
+    if (!(next.evidence > clear)) break;
+    now = std::move(next.solution);
+  }
+  return is_white(now.log, now.fit()) ? now : before;
+}
+
+/// As logged; or with commands that were given before their rows, if they explain more than flaws of the axis, lost
+/// commands and slips do.
 Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s, ServoKindRule rule) {
   const std::vector<ServoSample> log = sampled_log(as_read, sampled_t_s);
   const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
                                      refined(log, ServoKind::rate, searched(log, ServoKind::rate).params)};
-  Solution as_logged = with_flaws_tried(log, fits, rule);
+  const Solution as_logged = with_faults_tried(with_flaws_tried(log, fits, rule), rule);
   const std::array<std::optional<CommandTimes>, 2> times{command_times(log, fits[0]), command_times(log, fits[1])};
   std::array<ServoFit, 2> earlier = fits;
   for (std::size_t kind = 0; kind < 2; ++kind)
@@ -346,7 +344,8 @@ Solution solved(std::span<const ServoSample> as_read, const std::vector<double>&
   with_times.times = times[kind];
   const double rows = static_cast<double>(readings_of(log).size());
   const double of_times = times[kind]->evidence + evidence_of_flaws(rows, earlier[kind], with_times.fit());
-  return of_times > evidence_of_flaws(rows, fits[kind], as_logged.fit()) ? with_times : as_logged;
+  const double otherwise = evidence_of_flaws(rows, fits[kind], as_logged.fit()) - price_of_faults(log, as_logged);
+  return of_times > otherwise ? with_faults_tried(with_times, rule) : as_logged;
 }
 
 void count_command_times(std::span<const ServoSample> log, const std::optional<CommandTimes>& times,
@@ -380,12 +379,15 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
   result.fit = found.fit();
   result.other = found.fits[1 - found.believed];
   result.rivals = found.rivals[found.believed];
+  result.lost_commands = found.lost_commands;
+  result.slips = found.slips;
   const bool is_plain = result.fit.freed.empty();
   const ServoResponse response = servo_response(log, result.fit.kind, result.fit.params);
   const Eigen::VectorXd residuals =
       (is_plain ? response.angle_rad : flawed_response(log, result.fit, result.fit.flaws)) - readings_of(log);
   result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
-  set_clusters(log, is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit), result);
+  const Eigen::MatrixXd J = is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit);
+  set_clusters(log, with_slips(log, found.slips, J), result);
   result.status = status_of(result.fit);
   result.lag_one_correlation = lag_one(result.residual_rad);
   constexpr std::size_t several = 2;

@@ -48,6 +48,30 @@ Check blocks_agree(const ServoIdentification& identified) {
   return clusters_agree(clusters, "block", shared, "response");
 }
 
+/// What the log has that is none of the axis' doing: the answer is without it.
+void add_faults(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  constexpr std::size_t listed = 5;
+  if (const std::vector<std::size_t>& lost = identified.lost_commands; !lost.empty()) {
+    std::size_t given = 0;
+    for (std::size_t i = 1; i < log.size(); ++i) given += log[i].command != log[i - 1].command ? 1 : 0;
+    std::string text =
+        std::to_string(lost.size()) + " of " + std::to_string(given) + " commands were not followed (at t = ";
+    for (std::size_t i = 0; i < std::min(listed, lost.size()); ++i)
+      text += (i > 0 ? ", " : "") + text_of(log[lost[i]].given_s(), 4);
+    text += std::string(lost.size() > listed ? " s and on" : " s") +
+            "): they are taken as lost, the commands before them as still valid; see that commands arrive";
+    verdict.checks.push_back(
+        {"lost commands", State::care, text, static_cast<double>(lost.size()), 0.0, "commands", ""});
+  }
+  for (const ZeroSlip& slip : identified.slips)
+    verdict.checks.push_back(
+        {"encoder zero", State::care,
+         "the angle read slips by " + text_of(slip.size_rad / degree, 3) + " ± " +
+             text_of(3.0 * slip.sigma_rad / degree, 2) + "° at t = " + text_of(slip.t_s, 4) +
+             " s, which no command explains: estimated; see the encoder's coupling and counting, or part the log there",
+         slip.size_rad, 3.0 * slip.sigma_rad, "rad", ""});
+}
+
 void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const double correlation = identified.lag_one_correlation, rows = static_cast<double>(reading_times(log).size());
@@ -238,8 +262,9 @@ Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& 
   const bool is_angle = fit.kind == ServoKind::angle;
   Verdict verdict;
   add_readings(log, identified, verdict);
+  add_faults(log, identified, verdict);
   add_checks(log, identified, verdict);
-  add_causes(log, identified, verdict);
+  add_causes(without_faults(log, identified.lost_commands, identified.slips), identified, verdict);
   add_excitation(log, identified, verdict);
   verdict.sentence = std::string(is_angle ? "the angle" : "the rate") + " follows the command by " +
                      text_of(fit.params[0]) + " rad" + (is_angle ? "" : "/s") + " per unit with a time constant of " +

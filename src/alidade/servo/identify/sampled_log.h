@@ -34,6 +34,28 @@ struct HeldSampling {
                                                    const std::vector<double>& sampled_t_s,
                                                    const std::vector<double>& command_t_s = {});
 
+/// Rows whose command, of those that changed, the axis did not follow: what every command did is fitted by itself, with
+/// time constant and latency by their grid, then those are lost without which one gain explains the log. None where
+/// commands change fewer than four times or more than sixty, or a third seems lost.
+[[nodiscard]] std::vector<std::size_t> lost_commands(std::span<const ServoSample> log, ServoKind kind);
+
+/// 2 ln of how many choices there were of so many lost commands.
+[[nodiscard]] double price_of_lost(std::span<const ServoSample> log, std::size_t lost);
+
+/// The slip of the encoder's zero that explains most of what a fit leaves: a score test at each row with the parameters
+/// following. None where 2 ln of the likelihood ratio, counted in rows with independent errors, is not above 3 ln n +
+/// 12 (Schwarz's price of a size, that of a choice among n rows, and a margin).
+[[nodiscard]] std::optional<ZeroSlip> zero_slip(std::span<const ServoSample> log, const ServoFit& fit);
+
+/// A column of each slip beside those of parameters and freed flaws: ∂ reading / ∂ its size.
+[[nodiscard]] Eigen::MatrixXd with_slips(std::span<const ServoSample> log, const std::vector<ZeroSlip>& slips,
+                                         Eigen::MatrixXd J);
+
+/// The log as the axis had it: a lost command is the one before it, and the encoder's zero stays.
+[[nodiscard]] std::vector<ServoSample> without_faults(std::span<const ServoSample> log,
+                                                      const std::vector<std::size_t>& lost,
+                                                      const std::vector<ZeroSlip>& slips);
+
 /// A value of each row from one of each reading.
 [[nodiscard]] std::vector<double> by_row(std::span<const ServoSample> log, const std::vector<double>& by_reading);
 

@@ -102,6 +102,7 @@ TEST(ZoomingLog, HasRowsWithinTheirSigma) {
     const RotationLog log = log_of(zooms, static_cast<std::uint64_t>(seed));
     const ObserveSolution report = solve_intrinsics(log, setup());
     EXPECT_EQ(observe_verdict(report, log, setup()).state, State::good) << seed;
+    EXPECT_NE(std::ranges::find(report.assumed, "zoom.not_tested", &Assumption::name), report.assumed.end());
     const std::vector<double> errors = row_errors(report, log, zooms);
     ASSERT_GT(errors.size(), 250u);
     EXPECT_LE(num_beyond(errors, 5.0), errors.size() / 200) << seed;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
@@ -155,6 +156,28 @@ void add_fixed_centre(const ObserveSetup& config, const ObserveSolution& report,
   }
 }
 
+/// One row for what a lens that zooms changes beside its focal length and centre. It has no say in the verdict.
+void add_zoomed_lens(const ObserveSolution& report, std::vector<Assumption>& assumed) {
+  constexpr double clearly_zoomed = 1.02;
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  bool has_zoomed = false;
+  for (const IntrinsicsEstimate& row : report.steps) {
+    has_zoomed = has_zoomed || row.event == ObserveEvent::zoom;
+    if (!row.has_value || row.event == ObserveEvent::burst) continue;
+    least = std::min(least, row.fx);
+    most = std::max(most, row.fx);
+  }
+  if (!has_zoomed || most < clearly_zoomed * least) return;
+  Assumption row{.name = "zoom.not_tested",
+                 .value = most / least,
+                 .moved =
+                     "fx, fy, cx, cy: distortion and mounting are taken as the same at every zoom; what of them "
+                     "goes with it shows only where it is large"};
+  row.sigma = 0.0;
+  row.moves = std::nan("");
+  assumed.push_back(row);
+}
+
 }  // namespace
 
 std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetup& config,
@@ -192,6 +215,7 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
     fill_effect(effect.move, stated, report.scale.scale, assumed[effect.assumption]);
   }
   add_fixed_centre(config, report, stated, assumed);
+  add_zoomed_lens(report, assumed);
   return assumed;
 }
 

@@ -79,9 +79,10 @@ std::vector<FollowedChange> followed_changes(const std::vector<IntrinsicsEstimat
   return changes;
 }
 
-/// The centre of a lens that zooms moves by a few hundredths of the focal length's change: by more it was bumped.
+/// The centre of a lens that zooms moves by a few hundredths of the focal length's change, in Fang 2011 by as much: by
+/// far more it was bumped.
 std::optional<Check> moved_centre(const std::vector<IntrinsicsEstimate>& rows, const RotationLog& log) {
-  constexpr double most = 0.1;
+  constexpr double most = 3.0;
   for (const FollowedChange& change : followed_changes(rows)) {
     const IntrinsicsEstimate &a = rows[change.before], &b = rows[change.after];
     if (!a.sigma.allFinite() || !b.has_value || !b.sigma.allFinite()) continue;

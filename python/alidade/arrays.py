@@ -20,6 +20,11 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def name_shown(path: Any) -> str:
+    """The name of a file in a message: in one line, with nothing that a terminal obeys."""
+    return "".join(each if each.isprintable() else " " for each in str(path))
+
+
 def number(value: Any, name: str) -> float:
     """One number; whether it is finite is for who asked."""
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):

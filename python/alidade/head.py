@@ -5,6 +5,7 @@ import math
 from typing import Any
 
 from . import _alidade
+from .arrays import name_shown
 from .former import former
 from .job import Progress, files_for_call
 from .result import Result
@@ -34,7 +35,7 @@ class Head:
                 with open(password_file, encoding="utf-8") as file:
                     password = file.readline().rstrip("\r\n")
             except OSError as error:
-                raise ValueError(f"{password_file}: {error.strerror}") from None
+                raise ValueError(f"{name_shown(password_file)}: {error.strerror}") from None
         self._core: _alidade.Head | None = _alidade.Head(url, password, move, self._ranges["pan"] or _FREE,
                                                          self._ranges["tilt"] or _FREE)
 

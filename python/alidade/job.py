@@ -14,7 +14,7 @@ from typing import Any, Callable, Union
 import numpy as np
 
 from . import _alidade
-from .arrays import image, image_size, numbers
+from .arrays import image, image_size, name_shown, numbers
 from .board import Board
 from .camera import Camera
 from .result import Result
@@ -207,7 +207,7 @@ def _globbed(value: Any) -> Any:
     if isinstance(value, str) and glob.has_magic(value) and not os.path.exists(value):
         found = sorted(glob.glob(value, recursive=True))
         if not found:
-            raise ValueError(f"{value}: no file is called so")
+            raise ValueError(f"{name_shown(value)}: no file is called so")
         return found
     return value
 

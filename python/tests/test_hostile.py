@@ -71,6 +71,14 @@ class Hostile(InFolder):
                      lambda: al.track(self.events.tables["events"], rig=table), lambda: al.servo(table)):
             self.answered_or_refused(work)
 
+    def test_names_of_files_stand_in_one_line(self):
+        for name in ("?\n", "[\r]", "a\x1b[31m?", "x\n", "q\x0b"):
+            for work in (lambda: al.calibrate(name, board=BOARD), lambda: al.observe(name, size=(640, 480)), lambda: al.Camera.read(name),
+                         lambda: al.track(name, rig=name), lambda: al.Head("sim://", password_file=name)):
+                with self.assertRaises(ValueError) as caught:
+                    work()
+                self.assertTrue(str(caught.exception).isprintable(), str(caught.exception))
+
     def test_layouts_and_read_only_arrays(self):
         corners = board_corners(num_views=8)
         expected = al.calibrate(corners=corners, size=TRUE_CAMERA.size, board=BOARD).camera.parameters

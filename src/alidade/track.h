@@ -38,7 +38,8 @@ class TargetTracker {
   TargetTracker& operator=(TargetTracker&&) noexcept;
 
   /// What became of it. With `sigma_a_m_s2` given, the belief is that of the batch call on the same observations, whose
-  /// σ is increased at the end where the innovations require it; without, 1 m/s² is used until the end. Throws
+  /// σ is increased at the end where the innovations require it, and which keeps out rows that repeat; without, 1 m/s²
+  /// is used until the end. Throws
   /// ConfigError for an invalid observation, which is then not added.
   TrackStep push(const TargetObservation& observation);
   /// Predicted state at a time. None before the track begins, before the newest observation, or with xiahou2015.

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/track/checks/frozen_rows.h"
 #include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/checks/time_jitter.h"
 #include "alidade/track/xiahou_tracker.h"
@@ -22,9 +23,32 @@ void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<Predi
   smoothed.push_back({now->t_s, true, now->belief});
 }
 
+/// Of a row that is not followed: where the target is expected at its time, by the others.
+TrackStep kept_out_step(const Tracker& tracker, const TargetObservation& observation, const TrackReport& report) {
+  TrackStep step;
+  const auto expected = tracker.at(observation.t_capture_s);
+  if (expected) {
+    step.t_s = observation.t_capture_s;
+    step.belief = *expected;
+    step.has_belief = true;
+  } else if (!report.steps.empty()) {
+    step.t_s = report.steps.back().t_s;
+    step.belief = report.steps.back().belief;
+    step.has_belief = report.steps.back().has_belief;
+  }
+  step.event = TrackEvent::frozen;
+  return step;
+}
+
+/// What of the following is asked for besides the steps.
+struct AlsoAsked {
+  double predict_s = 0.0, smooth_s = 0.0;
+  std::vector<bool> kept_out;  ///< As of a FollowConfig.
+  TrackWatch watch;
+};
+
 TrackReport followed(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                     const TrackerConfig& config, const Progress& progress, double predict_s = 0.0,
-                     double smooth_s = 0.0, const TrackWatch& watch = {}) {
+                     const TrackerConfig& config, const Progress& progress, const AlsoAsked& also = {}) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
@@ -33,7 +57,8 @@ TrackReport followed(std::span<const TargetObservation> observations, std::span<
   for (const TargetObservation& observation : observations) {
     if (report.steps.size() % between_reports == 0)
       report_progress(progress, "tracking", report.steps.size(), observations.size());
-    const TrackStep step = tracker.take(observation);
+    const bool is_kept_out = report.steps.size() < also.kept_out.size() && also.kept_out[report.steps.size()];
+    const TrackStep step = is_kept_out ? kept_out_step(tracker, observation, report) : tracker.take(observation);
     report.num_used += step.accepted ? 1 : 0;
     report.num_starts += step.event == TrackEvent::start ? 1 : 0;
     report.num_restarts += step.event == TrackEvent::restart ? 1 : 0;
@@ -41,11 +66,11 @@ TrackReport followed(std::span<const TargetObservation> observations, std::span<
       report.log_likelihood -=
           0.5 * (std::min(step.innovation.nis, config.gate) + std::log(step.innovation.S.determinant()));
     report.steps.push_back(step);
-    if (watch) watch(observation, step);
-    if (smooth_s > 0.0) add_smoothed(tracker.smoothed(smooth_s), report.smoothed);
-    if (!(predict_s > 0.0)) continue;
-    const auto ahead = tracker.at(step.t_s + predict_s);
-    report.ahead.push_back({step.t_s + predict_s, ahead.has_value(), ahead.value_or(Belief<6>{})});
+    if (also.watch) also.watch(observation, step);
+    if (also.smooth_s > 0.0) add_smoothed(tracker.smoothed(also.smooth_s), report.smoothed);
+    if (!(also.predict_s > 0.0)) continue;
+    const auto ahead = tracker.at(step.t_s + also.predict_s);
+    report.ahead.push_back({step.t_s + also.predict_s, ahead.has_value(), ahead.value_or(Belief<6>{})});
   }
   if (report.num_starts > 0) report.status = TrackReport::Status::tracked;
   return report;
@@ -135,6 +160,14 @@ double position_nees(const TrackStep& step, const TrueTrack& truth) {
 
 namespace {
 
+std::vector<TargetObservation> without_kept_out(std::span<const TargetObservation> observations,
+                                                const std::vector<bool>& kept_out) {
+  std::vector<TargetObservation> others;
+  for (std::size_t i = 0; i < observations.size(); ++i)
+    if (i >= kept_out.size() || !kept_out[i]) others.push_back(observations[i]);
+  return others;
+}
+
 /// In order of capture: what is probable does not depend on what arrived first.
 std::vector<TargetObservation> as_captured(std::span<const TargetObservation> observations) {
   std::vector<TargetObservation> sorted(observations.begin(), observations.end());
@@ -208,15 +241,22 @@ TrackerConfig with_history(const FollowConfig& config) {
 TrackReport track_target(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                          const FollowConfig& config, const TrueTrack& truth, const TrackWatch& watch) {
   FollowConfig used = config;
+  std::vector<FrozenRows> frozen;
+  if (config.judge && config.kept_out.empty()) {
+    frozen = frozen_rows(observations, heads, config);
+    used.kept_out = rows_of(frozen, observations);
+  }
+  const std::vector<TargetObservation> others = without_kept_out(observations, used.kept_out);
   if (config.find_sigma_a)
-    used.tracker.sigma_a_m_s2 = max_probable_sigma_a(as_captured(observations), heads, config.tracker, config.progress);
+    used.tracker.sigma_a_m_s2 = max_probable_sigma_a(as_captured(others), heads, config.tracker, config.progress);
   used.tracker = with_history(used);
-  TrackReport report =
-      followed(observations, heads, used.tracker, config.progress, config.predict_s, config.smooth_s, watch);
+  TrackReport report = followed(observations, heads, used.tracker, config.progress,
+                                {config.predict_s, config.smooth_s, used.kept_out, watch});
+  report.frozen = std::move(frozen);
   report.sigma_a_is_found = config.find_sigma_a;
   const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
   if (config.judge) {
-    judge_observations(observations, heads, used, report);
+    judge_observations(others, heads, used, report);
     inflate(report);
     heed_faults(observations, heads, used, report);
   } else {

@@ -24,7 +24,9 @@ struct FollowConfig {
   double smooth_s = 0.0;     ///< Above 0: also smoothed, with observations up to that much later; not for imm.
   double warm_up_s = 0.5;    ///< After the start of a track: excluded from errors and statistics.
   bool judge = true;         ///< Test the innovations, increase σ accordingly, and test for faults of the rig.
-  Progress progress = {};    ///< Is called now and then, and may stop the work.
+  /// Rows that are not followed, one per observation; none: those that repeat, if it is judged.
+  std::vector<bool> kept_out = {};
+  Progress progress = {};  ///< Is called now and then, and may stop the work.
 };
 
 /// The tracker's config, with the history that smoothing needs.

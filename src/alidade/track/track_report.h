@@ -62,6 +62,15 @@ struct TimeJitter {
   double gain = 0.0;     ///< Of ln p, over innovations that are larger by one factor, whatever the motion.
 };
 
+/// Rows of a head that repeat the one before them exactly, and are kept out.
+struct FrozenRows {
+  std::size_t head = 0;                            ///< Index in the rig's list of heads.
+  bool pan = false, tilt = false, pixels = false;  ///< What repeats.
+  std::size_t num = 0;                             ///< Rows that repeat.
+  double from_s = 0.0, until_s = 0.0;              ///< Capture times of the first and of the last one.
+  bool agrees = false;  ///< The track without them expects every one where it is, as of a target at rest.
+};
+
 /// What became of all observations, and how good it is. Positions and velocities are in the rig's world.
 struct TrackReport {
   enum class Status { tracked, no_start };
@@ -91,6 +100,7 @@ struct TrackReport {
   std::vector<RigPower> power;       ///< Of each parameter that is tested.
   bool fits_without_fault = false;   ///< The first is significant, and with it corrected the observations fit.
   bool errors_are_counted = false;   ///< Those of the rig.
+  std::vector<FrozenRows> frozen;    ///< Kept out, in order of heads and times.
 };
 
 /// Called with each observation and what became of it. What it throws ends the work.

@@ -20,8 +20,9 @@ enum class TrackEvent {
   outside,   ///< Observation rejected: its pixel is not in the image, or not a number.
   late,      ///< Observation rejected: older than the history.
   one_head,  ///< Used, but only one head has seen the target for a while: its range is drifting.
+  frozen,    ///< Kept out: the row repeats the one before it, because its head's image or encoders stood still.
 };
-/// "", waiting, start, restart, gated, depth, outside, late, one_head.
+/// "", waiting, start, restart, gated, depth, outside, late, one_head, frozen.
 [[nodiscard]] std::string_view event_name(TrackEvent event);
 
 /// What became of one observation. The belief is that of the newest capture time so far, position and velocity in the

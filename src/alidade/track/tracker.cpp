@@ -108,8 +108,8 @@ std::string_view motion_name(TargetMotion method) {
 }
 
 std::string_view event_name(TrackEvent event) {
-  constexpr std::array<std::string_view, 9> names{"",      "waiting", "start", "restart", "gated",
-                                                  "depth", "outside", "late",  "one_head"};
+  constexpr std::array<std::string_view, 10> names{"",      "waiting", "start", "restart",  "gated",
+                                                   "depth", "outside", "late",  "one_head", "frozen"};
   return names[static_cast<std::size_t>(event)];
 }
 

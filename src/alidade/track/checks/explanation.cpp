@@ -164,4 +164,52 @@ std::optional<Explanation> explanation_of(std::span<const TargetObservation> obs
   return best;
 }
 
+namespace {
+
+/// How many pairs of observations there are at a time, and of them, with parallel rays.
+struct PairCounts {
+  std::size_t together = 0, parallel = 0;
+};
+
+PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const RigHead> heads,
+                       const FollowConfig& config) {
+  PairCounts counts;
+  std::vector<TargetObservation> observations(given.begin(), given.end());
+  std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
+  for (std::size_t i = 1; i < observations.size(); ++i) {
+    const TargetObservation &a = observations[i - 1], &b = observations[i];
+    if (a.head == b.head || a.head >= heads.size() || b.head >= heads.size() ||
+        std::abs(a.t_capture_s - b.t_capture_s) > config.tracker.together_s)
+      continue;
+    ++counts.together;
+    const auto ray_a = ray_in_world(heads[a.head], a);
+    const auto ray_b = ray_in_world(heads[b.head], b);
+    if (ray_a && ray_b && !nearest_to_rays(*ray_a, *ray_b)) ++counts.parallel;
+  }
+  return counts;
+}
+
+}  // namespace
+
+bool are_parallel(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                  const FollowConfig& config) {
+  const PairCounts counts = count_pairs(observations, heads, config);
+  return 2 * counts.parallel > counts.together;
+}
+
+Explanation why_no_start(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                         const FollowConfig& config) {
+  const auto [together, parallel] = count_pairs(observations, heads, config);
+  if (together == 0)
+    return {
+        "the heads never see the target within " + text_of(1e3 * config.tracker.together_s, 2) + " ms of each other",
+        "take images more often, or set their clocks"};
+  if (2 * parallel > together)
+    return {"parallel rays: the heads look in the same direction, so that the range cannot be determined",
+            "set the heads further apart, or let the target come nearer"};
+  return {"the two heads' rays do not meet within " + text_of(config.tracker.min_depth_m, 2) + " to " +
+              text_of(config.tracker.max_depth_m, 2) + " m",
+          "check the rig file, or widen the working range"};
+}
+
 }  // namespace alidade

@@ -25,4 +25,12 @@ struct Explanation {
 /// "the clock of head 2 seems 30 ms behind that of head 1 …"
 [[nodiscard]] std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads);
 
+/// Whether most observations of two heads at a time have parallel rays.
+[[nodiscard]] bool are_parallel(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                const FollowConfig& config);
+
+/// Why no track began although there were two heads at a time.
+[[nodiscard]] Explanation why_no_start(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                       const FollowConfig& config);
+
 }  // namespace alidade

@@ -1,33 +1,28 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "alidade/pantilt/rig.h"
-#include "alidade/pantilt/target_observation.h"
+#include "alidade/track/track.h"
 
 namespace alidade {
 
-/// Rows of a head that repeat the one before them exactly.
-struct FrozenRows {
-  std::size_t head = 0;
-  bool is_of_pixels = false;  ///< Else of the readings.
-  std::size_t num = 0;        ///< Of rows that repeat.
-  double from_s = 0.0, until_s = 0.0;
-};
+/// Rows of heads whose images or encoders stood still, in order of heads and times: of runs of values that repeat the
+/// one before more often than chance explains, those where the head's values otherwise have noise, which repeats
+/// nothing, and those that the track without them contradicts (rounded values, and those of a head at rest, may
+/// repeat).
+[[nodiscard]] std::vector<FrozenRows> frozen_rows(std::span<const TargetObservation> observations,
+                                                  std::span<const RigHead> heads, const FollowConfig& config);
 
-/// The longest such run of all heads that chance does not explain: pixels, where those of the head otherwise hardly
-/// ever repeat, and are no multiples of a coarse step (a target at rest); readings, where besides the first one after
-/// it is further away than the head goes in that time elsewhere (a head at rest starts slowly). Observations are in
-/// order of capture.
-[[nodiscard]] std::optional<FrozenRows> frozen_rows(std::span<const TargetObservation> observations,
-                                                    std::size_t num_heads);
+/// Whether each observation is one of them; empty where there are none.
+[[nodiscard]] std::vector<bool> rows_of(std::span<const FrozenRows> frozen,
+                                        std::span<const TargetObservation> observations);
 
-/// "the pixels of head 2 are exactly the same in 20 rows from 7.3 to 8.3 s: …".
+/// "the pixels of head 2 are exactly those of the row before in 20 rows from 7.3 to 8.3 s: …".
 [[nodiscard]] std::string frozen_text(const FrozenRows& frozen, std::span<const RigHead> heads);
 
-/// "leave out the rows of head 2 from 7.3 to 8.3 s".
+/// "find out why head 2 stood still from 7.3 to 8.3 s: …".
 [[nodiscard]] std::string frozen_remedy(const FrozenRows& frozen, std::span<const RigHead> heads);
 
 }  // namespace alidade

@@ -41,51 +41,6 @@ bool fits(const TrackReport& report) {
 using Observations = std::vector<TargetObservation>;
 using Fault = Explanation;
 
-/// How many pairs of observations there are at a time, and of them, with parallel rays.
-struct PairCounts {
-  std::size_t together = 0, parallel = 0;
-};
-
-PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const RigHead> heads,
-                       const FollowConfig& config) {
-  PairCounts counts;
-  Observations observations(given.begin(), given.end());
-  std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
-  for (std::size_t i = 1; i < observations.size(); ++i) {
-    const TargetObservation &a = observations[i - 1], &b = observations[i];
-    if (a.head == b.head || a.head >= heads.size() || b.head >= heads.size() ||
-        std::abs(a.t_capture_s - b.t_capture_s) > config.tracker.together_s)
-      continue;
-    ++counts.together;
-    const auto ray_a = ray_in_world(heads[a.head], a);
-    const auto ray_b = ray_in_world(heads[b.head], b);
-    if (ray_a && ray_b && !nearest_to_rays(*ray_a, *ray_b)) ++counts.parallel;
-  }
-  return counts;
-}
-
-bool are_parallel(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                  const FollowConfig& config) {
-  const PairCounts counts = count_pairs(observations, heads, config);
-  return 2 * counts.parallel > counts.together;
-}
-
-/// Why no track began although there were two heads at a time.
-Fault why_no_start(std::span<const TargetObservation> given, std::span<const RigHead> heads,
-                   const FollowConfig& config) {
-  const auto [together, parallel] = count_pairs(given, heads, config);
-  if (together == 0)
-    return {
-        "the heads never see the target within " + text_of(1e3 * config.tracker.together_s, 2) + " ms of each other",
-        "take images more often, or set their clocks"};
-  if (2 * parallel > together)
-    return {"parallel rays: the heads look in the same direction, so that the range cannot be determined",
-            "set the heads further apart, or let the target come nearer"};
-  return {"the two heads' rays do not meet within " + text_of(config.tracker.min_depth_m, 2) + " to " +
-              text_of(config.tracker.max_depth_m, 2) + " m",
-          "check the rig file, or widen the working range"};
-}
-
 /// Pixels beyond the image of the rig's camera: the rig file is of another camera.
 std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetObservation> observations,
                                   std::span<const RigHead> heads) {
@@ -254,12 +209,12 @@ bool is_doubtful(const TrackReport& report) {
 }
 
 Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
-                 std::span<const RigHead> heads, const FollowConfig& config, bool is_frozen) {
+                 std::span<const RigHead> heads, const FollowConfig& config) {
   FollowConfig found = config;
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
   const bool is_explained = is_explained_by_fault(report);
-  if (report.num_starts > 0 && !is_explained && !is_frozen && is_doubtful(report))
+  if (report.num_starts > 0 && !is_explained && report.frozen.empty() && is_doubtful(report))
     causes.other = other_object(observations, heads, config, report);
   if (causes.other) return causes;
   if (is_explained && !fits(report)) return causes;
@@ -330,9 +285,9 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
   return std::nullopt;
 }
 
-std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
-  std::string sentence = "tracked through " + std::to_string(report.num_used) + " of " +
-                         std::to_string(report.steps.size()) + " observations";
+std::string sentence_of(const TrackReport& report, std::size_t num_given, const Verdict& verdict) {
+  std::string sentence =
+      "tracked through " + std::to_string(report.num_used) + " of " + std::to_string(num_given) + " observations";
   if (report.num_restarts > 0) sentence += ", started again " + std::to_string(report.num_restarts) + " times";
   if (verdict.state == State::good) return sentence;
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
@@ -354,23 +309,41 @@ void put_likelier_first(Verdict& verdict) {
   if (0.5 * rig->value * rig->value > falls->value) std::rotate(falls, falls + 1, verdict.checks.end());
 }
 
-}  // namespace
+/// What was followed, without the rows that were kept out.
+struct Followed {
+  TrackReport report;
+  Observations observations;
 
-Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
-                      std::span<const RigHead> heads, const FollowConfig& config) {
-  std::set<std::size_t> seen_by;
-  for (const TargetObservation& observation : observations) seen_by.insert(observation.head);
-  if (seen_by.size() < 2)
-    return refused({"one head only: the range along its ray cannot be determined", "add the events of a second head"});
+  Followed(const TrackReport& all, std::span<const TargetObservation> given) : report(all) {
+    report.steps.clear();
+    for (std::size_t i = 0; i < given.size() && i < all.steps.size(); ++i) {
+      if (all.steps[i].event == TrackEvent::frozen) continue;
+      report.steps.push_back(all.steps[i]);
+      observations.push_back(given[i]);
+    }
+  }
+};
+
+void add_frozen(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
+  for (const FrozenRows& one : report.frozen)
+    verdict.checks.push_back(check("frozen", one.agrees ? State::good : State::care, frozen_text(one, heads),
+                                   static_cast<double>(one.num), 0.0, "rows"));
+}
+
+/// What to do about the first that the others contradict.
+void set_frozen_remedy(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
+  const auto first = std::ranges::find(report.frozen, false, &FrozenRows::agrees);
+  if (first != report.frozen.end()) verdict.to_add = frozen_remedy(*first, heads);
+}
+
+Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation> observations,
+                   std::span<const RigHead> heads, const FollowConfig& config, std::size_t num_given) {
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
-  const auto frozen = frozen_rows(with_shift(observations, {}), heads.size());
-  Causes causes = causes_of(report, observations, heads, config, frozen.has_value());
+  Causes causes = causes_of(report, observations, heads, config);
   causes.step_s = step_that_explains(observations, report, causes.shift);
   if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
   Verdict verdict;
-  if (frozen)
-    verdict.checks.push_back(
-        check("frozen", State::care, frozen_text(*frozen, heads), static_cast<double>(frozen->num), 0.0, "rows"));
+  add_frozen(report, heads, verdict);
   if (causes.other) add_other(*causes.other, heads, verdict);
   if (report.jitter)
     verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
@@ -386,11 +359,24 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   if (!alike_per_head(report).empty()) verdict.to_add = fault_remedy(report, heads);
   if (causes.step_s > 0.0) verdict.to_add = rounding_remedy(causes.step_s);
   if (report.jitter) verdict.to_add = jitter_remedy();
-  if (frozen) verdict.to_add = frozen_remedy(*frozen, heads);
+  set_frozen_remedy(report, heads, verdict);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   if (causes.other) verdict.to_add = other_object_remedy(*causes.other, heads);
-  verdict.sentence = sentence_of(report, verdict);
+  verdict.sentence = sentence_of(report, num_given, verdict);
   return verdict;
+}
+
+}  // namespace
+
+Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
+                      std::span<const RigHead> heads, const FollowConfig& config) {
+  std::set<std::size_t> seen_by;
+  for (const TargetObservation& observation : observations) seen_by.insert(observation.head);
+  if (seen_by.size() < 2)
+    return refused({"one head only: the range along its ray cannot be determined", "add the events of a second head"});
+  if (report.frozen.empty()) return verdict_of(report, observations, heads, config, report.steps.size());
+  const Followed followed(report, observations);
+  return verdict_of(followed.report, followed.observations, heads, config, report.steps.size());
 }
 
 }  // namespace alidade

@@ -24,8 +24,9 @@ struct Hover {
   double lasting = 0.0;  ///< Correlation of a point's pixel errors from frame to frame: as a drifting track has them.
   double loose = 1.0;    ///< By which every third point's errors are larger, as of corners of two surfaces.
   double distance_m = 0.9;
-  double sway = 1.0;  ///< Share of its translation: at 0 it rotates in place,
-  double turn = 1.0;  ///< and of its rotation: at 0 of both it stands still.
+  bool is_wall = false;  ///< The others are on an oblique wall behind the target.
+  double sway = 1.0;     ///< Share of its translation: at 0 it rotates in place,
+  double turn = 1.0;     ///< and of its rotation: at 0 of both it stands still.
   // What is not as given.
   double readout_s = 0.0;         ///< From the first row to the last, the time being that of the central one.
   double target_speed_m_s = 0.0;  ///< Along x, against the other points.
@@ -148,7 +149,7 @@ inline std::vector<Eigen::Vector3d> points_of(const Hover& scene, Draws& draws, 
   const double wide = scene.lens == HoverLens::fisheye ? 2.0 : 1.0;
   for (int i = 0; i < scene.num_others; ++i) {
     const double x = wide * draws.uniform(-0.8, 0.8), y = wide * draws.uniform(-0.6, 0.6), z = draws.uniform(-0.2, 0.9);
-    points.emplace_back(x, y, z);
+    points.emplace_back(x, y, scene.is_wall ? 0.1 + 0.15 * x - 0.1 * y : z);
   }
   return points;
 }

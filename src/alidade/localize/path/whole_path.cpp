@@ -108,20 +108,39 @@ std::optional<SmoothedPath> smooth_with_loops(const Recording& recording, Smooth
   return smoothed;
 }
 
+/// Whether the points of a problem do not hold many of the frames though enough is seen there: a filter without a
+/// target that knows few depths may leave half of a path to the motion that was supposed.
+bool leaves_frames(const SmootherProblem& problem, std::span<const ObservationFrame> frames) {
+  constexpr std::size_t many = 20;  // one frame of so many
+  std::vector<std::size_t> num_of_map(problem.world_from_cam.size(), 0);
+  for (const UsedObservation& each : problem.observations) ++num_of_map[each.frame];
+  std::size_t num_left = 0;
+  for (std::size_t k = 0; k < num_of_map.size(); ++k)
+    num_left +=
+        num_of_map[k] < min_observations && frames[problem.first_frame + k].observations.size() >= min_observations ? 1
+                                                                                                                    : 0;
+  return many * num_left > num_of_map.size();
+}
+
+bool drops_much(const SmoothedPath& smoothed, const SmootherProblem& problem) {
+  constexpr std::size_t few = 20;
+  return few * smoothed.num_dropped > problem.observations.size();
+}
+
 /// Whether a lens is estimated, and much that the filter saw by another one does not fit it.
 bool has_other_lens(const SmoothedPath& smoothed, const SmootherProblem& problem) {
-  constexpr std::size_t few = 20;
-  return smoothed.is_lens_freed && few * smoothed.num_dropped > problem.observations.size();
+  return smoothed.is_lens_freed && drops_much(smoothed, problem);
 }
 
 /// After a new beginning the filter knows few depths, often those of the target alone, which a path by a wrong lens
-/// fits as well: it is solved again with all that it sees, and with what fits another lens where that is estimated.
-/// Where that does not settle, nothing is explained.
+/// fits as well: it is solved again with all that it sees, and with what fits another lens where that is estimated, or
+/// the better path. Where that does not settle, nothing is explained.
 void solve_with_remaining(std::span<const ObservationFrame> frames, bool frees_lens, SmootherProblem& given,
                           SmoothedPath& smoothed, Localization& result) {
   constexpr int most = 3;
   for (int i = 0; i < most; ++i) {
     SmootherProblem problem = given;
+    const std::size_t num_points = given.points.size();
     begin_at(smoothed, 1.0, problem);
     add_remaining(smoothed, frames.subspan(given.first_frame), problem);
     problem.frees_lens = frees_lens;
@@ -132,7 +151,7 @@ void solve_with_remaining(std::span<const ObservationFrame> frames, bool frees_l
     result = std::move(again);
     smoothed = std::move(*with_all);
     given = std::move(problem);
-    if (!has_other_lens(smoothed, given)) return;
+    if (!has_other_lens(smoothed, given) && !(drops_much(smoothed, given) && given.points.size() > num_points)) return;
   }
 }
 
@@ -310,7 +329,9 @@ std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEn
                                                            engine.best(), recording.gone, engine.start_without_target(),
                                                            recording.period_s, !recording.number_of.empty());
   if (!problem) return std::nullopt;
-  const bool lacks_points = !result.is_of_images && recording.record.num_begun() > 1;
+  const bool knows_few = recording.record.num_begun() > 1 ||
+                         (problem->gauge == PathGauge::similarity && leaves_frames(*problem, frames.frames()));
+  const bool lacks_points = !result.is_of_images && knows_few;
   // Whoever asks for less of the lens gets the path by that.
   const bool frees_lens = result.is_of_images || config.distortion == DistortionVariant::full;
   problem->frees_lens = frees_lens && !lacks_points;

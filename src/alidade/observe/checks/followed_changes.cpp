@@ -158,13 +158,15 @@ std::optional<Check> worst_span(const std::vector<IntrinsicsEstimate>& rows, con
 }  // namespace
 
 void widen_before_zooms(std::vector<IntrinsicsEstimate>& rows) {
-  constexpr std::size_t num_undecided = 2;
+  constexpr std::size_t num_undecided = 2, num_unnoticed = 30;
+  constexpr double hardly_seen = 6.0;  // σ of one frame: a change of that is about what its χ² of 45 points rejects
   std::optional<std::size_t> last;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (rows[k].event == ObserveEvent::zoom && last) {
-      const std::size_t from = *last + 1 > num_undecided ? *last + 1 - num_undecided : 0;
-      for (std::size_t i = from; i < k; ++i) {
-        const Eigen::Array4d change = (rows[k].values() - rows[i].values()).array();
+      const Eigen::Array4d unseen = hardly_seen * rows[k].sigma.array();
+      for (std::size_t i = *last + 1 > num_unnoticed ? *last + 1 - num_unnoticed : 0; i < k; ++i) {
+        Eigen::Array4d change = (rows[k].values() - rows[i].values()).array().abs();
+        if (i + num_undecided <= *last) change = change.min(unseen);
         if (rows[i].has_value) rows[i].sigma = (rows[i].sigma.array().square() + change.square()).sqrt();
       }
     }

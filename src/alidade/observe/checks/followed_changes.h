@@ -10,7 +10,8 @@ namespace alidade {
 /// row of the log, with their σ before `widen_before_zooms`.
 [[nodiscard]] std::vector<Check> followed_checks(const std::vector<IntrinsicsEstimate>& rows, const RotationLog& log);
 
-/// The rows just before a zoom was noticed may be of it already: their σ includes the change that came.
+/// The rows just before a zoom was noticed may be of it already: their σ includes the change that came, in those before
+/// them no more of it than one frame would not show (a slow zoom).
 void widen_before_zooms(std::vector<IntrinsicsEstimate>& rows);
 
 }  // namespace alidade

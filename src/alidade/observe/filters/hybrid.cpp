@@ -33,7 +33,12 @@ HybridObserver::HybridObserver(const HybridConfig& config)
       frames_out_(config.num_points, 0),
       patience_(config.num_points, slip_patience),
       candidate_(filter_),
-      point_drift_(config.num_points) {}
+      window_start_(filter_),
+      last_window_start_(filter_),
+      is_out_(config.num_points),
+      point_drift_(config.num_points) {
+  constant_spans_.reserve(max_spans);
+}
 
 void HybridObserver::normalise(const RotationFrame& frame) {
   for (std::size_t i = 0; i < px_.size(); ++i) {
@@ -47,6 +52,7 @@ IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
   if (frame.starts_segment && buffer_.size() > 0) {
     buffer_.renew_all();
     filter_.forget_points();
+    has_window_starts_ = false;
     estimate.event = ObserveEvent::new_segment;
   }
   rejected_step_.setZero();
@@ -93,6 +99,7 @@ bool HybridObserver::adjust_buffer() {
   filter_.start(adjustment.solution, adjustment.bundle_point_of, sigma_px_);
   sum_nis_ = sum_dof_ = std::max(adjustment.solution.dof, 1);
   drift_frames_ = 0;
+  has_window_starts_ = false;
   const CommonMatrix& P = filter_.covariance();
   const Eigen::Vector4d& k = filter_.camera().k;
   is_coarse_ = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > config_.fine_enough;
@@ -104,6 +111,7 @@ bool HybridObserver::adjust_buffer() {
 void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
   const Eigen::Vector4d k_before = filter_.camera().k;
   if (is_zooming_) filter_.predict(zoom_process_noise(), 0.0);
+  if (frames_to_settle_ > 0) settle_on(frame.t_s);
   filter_.observe(frame, px_);
   Judgement judgement = judge();
   if (judgement.event == ObserveEvent::burst && is_coarse_) {
@@ -131,16 +139,18 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     return;
   }
   has_candidate_ = false;
-  if (!is_zooming_ && has_drifted(estimate) && !config_.no_zoom) {
+  if (!is_zooming_ && frames_to_settle_ == 0 && has_drifted(estimate) && !config_.no_zoom) {
     estimate.event = ObserveEvent::zoom;
     begin_zoom();
+    go_back(filter_, frame);
     jump(filter_, frame);
   }
   take_in(frame, judgement);
   if (is_zooming_) learn_zoom_process_noise(k_before);
   if (is_zooming_ && has_zoom_ended()) {
-    is_zooming_ = false;
+    is_zooming_ = has_window_starts_ = false;
     constant_since_s_ = frame.t_s;
+    begin_settling();
     estimate.event = ObserveEvent::zoom_end;
   }
 }
@@ -150,6 +160,9 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
 bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   if (drift_frames_ == 0) {
     drift_from_s_ = last_fit_s_;
+    last_window_start_ = has_window_starts_ ? window_start_ : filter_;
+    window_start_ = filter_;
+    has_window_starts_ = true;
     drift_ = {};
     std::fill(point_drift_.begin(), point_drift_.end(), Score{});
   }
@@ -252,6 +265,7 @@ void HybridObserver::settle() {
 void HybridObserver::restart(IntrinsicsEstimate& estimate) {
   if (!is_zooming_) note_constant_span();
   is_running_ = is_zooming_ = false;
+  frames_to_settle_ = 0;
   has_candidate_ = false;
   buffer_.clear();
   estimate.event = ObserveEvent::restart;

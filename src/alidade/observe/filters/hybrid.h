@@ -47,9 +47,12 @@ class HybridObserver {
     double from_s = 0.0, until_s = 0.0;
     bool is_current = false;  ///< Lasts to the end, whether or not the last frames fit.
     [[nodiscard]] double duration_s() const { return until_s - from_s; }
+    [[nodiscard]] bool contains(double t_s) const { return t_s >= from_s - 1e-9 && t_s <= until_s + 1e-9; }
   };
   /// The longest so far; of zero length while there is none.
   [[nodiscard]] ConstantSpan longest_constant_span() const;
+  /// All, in the order of time; of more than a few dozen the longest.
+  [[nodiscard]] std::vector<ConstantSpan> constant_spans() const;
   /// At the end of the log: where the estimate is still coarse, adjusts all frames together.
   void settle();
 
@@ -72,11 +75,16 @@ class HybridObserver {
   [[nodiscard]] bool is_zoom(const RotationFrame& frame);
   bool reject_until_zoomed();
   void jump(ArrowheadFilter& filter, const RotationFrame& frame) const;
+  [[nodiscard]] bool is_noticed_late();
+  void go_back(ArrowheadFilter& filter, const RotationFrame& frame);
   void begin_zoom();
   [[nodiscard]] bool has_drifted(IntrinsicsEstimate& estimate);
   [[nodiscard]] int drifting_point() const;
   void reinitialise(std::size_t point);
   [[nodiscard]] bool has_zoom_ended();
+  [[nodiscard]] Eigen::Vector4d unseen_change() const;
+  void begin_settling();
+  void settle_on(double t_s);
   void take_in(const RotationFrame& frame, const Judgement& judgement);
   [[nodiscard]] bool has_gained_much();
   void note_slips();
@@ -88,8 +96,9 @@ class HybridObserver {
   [[nodiscard]] double noise_ratio() const;
   void report(double t_s, IntrinsicsEstimate& estimate) const;
 
-  static constexpr double gate_z = 3.09;     ///< One good frame in a thousand is rejected.
-  static constexpr double any_zoom = 1e6;    ///< So many frames of zoom at once: hardly a prior on the intrinsics.
+  static constexpr double gate_z = 3.09;   ///< One good frame in a thousand is rejected.
+  static constexpr double any_zoom = 1e6;  ///< So many frames of zoom at once: hardly a prior on the intrinsics.
+  static constexpr std::size_t max_spans = 32;
   static constexpr int settled_frames = 10;  ///< Without change over so many frames a zoom has ended.
 
   HybridConfig config_;
@@ -100,19 +109,24 @@ class HybridObserver {
   std::vector<int> patience_;        ///< and how many before it is initialised again.
   ArrowheadFilter candidate_;        ///< The filter if the last frame was a zoom.
   bool has_candidate_ = false;
-  bool is_coarse_ = true;  ///< Still adjusted, not only filtered.
+  ArrowheadFilter window_start_, last_window_start_;  ///< The filter when the drift's window began, and the one before.
+  bool has_window_starts_ = false;
+  std::vector<bool> is_out_;  ///< One per point: rejected in this frame.
+  bool is_coarse_ = true;     ///< Still adjusted, not only filtered.
   bool is_running_ = false;
   double sigma_px_ = 0.0;  ///< Normalised.
   double next_adjustment_s_ = 0.0;
   double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
   double drift_from_s_ = 0.0;  ///< The last frame before those whose scores are being added: a zoom may begin after it.
   Eigen::Vector4d rejected_step_ = Eigen::Vector4d::Zero();  ///< Of fx, fy, cx, cy, as a rejected frame asks for it.
-  ConstantSpan constant_span_;                               ///< The longest before the intrinsics last changed.
+  std::vector<ConstantSpan> constant_spans_;                 ///< Before the intrinsics last changed.
   Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, by the last adjustment.
   int frames_since_adjustment_ = 0;
   double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.
   bool is_zooming_ = false;
   Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();  ///< Of a frame's change while zooming, as it was of late.
+  int frames_to_settle_ = 0;                                 ///< After a zoom has ended it may still go on, slowly,
+  Eigen::Vector4d settling_variance_ = Eigen::Vector4d::Zero();  ///< by so much a frame.
   std::array<Eigen::Vector4d, settled_frames> past_k_;
   int past_count_ = 0;
   struct Score {

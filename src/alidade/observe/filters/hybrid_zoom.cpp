@@ -48,14 +48,17 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
       return true;
     }
   }
+  const bool is_late = fits_another && !is_zooming_ && is_noticed_late();
   if (fits_clearly && (has_candidate_ || is_zooming_)) {
     begin_zoom();
+    if (is_late) go_back(filter_, frame);
     jump(filter_, frame);
     return true;
   }
   has_candidate_ = fits_another;
   if (has_candidate_) {
     candidate_ = filter_;
+    if (is_late) go_back(candidate_, frame);
     jump(candidate_, frame);
     candidate_.update();
   }
@@ -84,6 +87,26 @@ bool HybridObserver::reject_until_zoomed() {
   return false;
 }
 
+/// Is the change no more than twice what one frame shows? It may have been smaller in frames before, and is in the
+/// filter's points, then.
+bool HybridObserver::is_noticed_late() {
+  const double shown = chi2_quantile(filter_.dof(), gate_z) - filter_.dof();
+  return filter_.nis() - filter_.with_added_variance(process_noise(filter_, any_zoom)).nis < 4.0 * shown;
+}
+
+/// To the filter of a window and more ago, with this frame observed: what the frames since then taught it was of a
+/// camera that was changing already.
+void HybridObserver::go_back(ArrowheadFilter& filter, const RotationFrame& frame) {
+  if (!has_window_starts_) return;
+  is_out_.assign(is_out_.size(), false);
+  for (std::size_t i = 0; i < filter.num_seen(); ++i)
+    is_out_[static_cast<std::size_t>(filter.seen_point(i))] = filter.is_rejected(i);
+  filter = last_window_start_;
+  filter.observe(frame, px_);
+  for (std::size_t i = 0; i < filter.num_seen(); ++i)
+    filter.set_rejected(i, is_out_[static_cast<std::size_t>(filter.seen_point(i))]);
+}
+
 /// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
 /// make a drift of 1 px as noisy as one frame is.
 void HybridObserver::jump(ArrowheadFilter& filter, const RotationFrame& frame) const {
@@ -100,6 +123,7 @@ void HybridObserver::begin_zoom() {
     past_count_ = 0;
     zoom_variance_.setZero();
     note_constant_span();
+    frames_to_settle_ = 0;
   }
   is_zooming_ = true;
   drift_frames_ = 0;
@@ -114,19 +138,49 @@ bool HybridObserver::has_zoom_ended() {
   past_k_[static_cast<std::size_t>(past_count_ % settled_frames)] = now;
   if (past_count_++ < settled_frames) return false;
   if ((zoom_variance_.array() > 4.0 * process_noise(filter_, 1.0).head<4>().array()).any()) return false;
-  const Eigen::Vector4d sigma = filter_.covariance().diagonal().head<4>().cwiseSqrt() * std::sqrt(2.0);
-  return ((now - before).cwiseAbs().array() < 3.0 * sigma.array()).all();
+  return ((now - before).cwiseAbs().array() < unseen_change().array()).all();
+}
+
+/// What the settled frames' estimates may differ by if all of it is noise.
+Eigen::Vector4d HybridObserver::unseen_change() const {
+  return 3.0 * std::sqrt(2.0) * filter_.covariance().diagonal().head<4>().cwiseSqrt();
+}
+
+/// A zoom so slow that it passed for one that had ended is followed for as long again.
+void HybridObserver::begin_settling() {
+  frames_to_settle_ = 2 * settled_frames;
+  settling_variance_ = (unseen_change() / settled_frames).cwiseAbs2();
+}
+
+void HybridObserver::settle_on(double t_s) {
+  --frames_to_settle_;
+  constant_since_s_ = t_s;
+  CommonVector variance = CommonVector::Zero(filter_.layout().size);
+  variance.head<4>() = settling_variance_;
+  filter_.predict(variance, 0.0);
 }
 
 /// The intrinsics were constant until now, or until the frames that showed, together, that they are not.
 void HybridObserver::note_constant_span() {
   const ConstantSpan span{constant_since_s_, std::max(constant_since_s_, std::min(last_fit_s_, drift_from_s_))};
-  if (span.duration_s() > constant_span_.duration_s()) constant_span_ = span;
+  if (constant_spans_.size() == max_spans)
+    constant_spans_.erase(std::ranges::min_element(constant_spans_, {}, &ConstantSpan::duration_s));
+  constant_spans_.push_back(span);
 }
 
 HybridObserver::ConstantSpan HybridObserver::longest_constant_span() const {
-  const ConstantSpan span{constant_since_s_, last_fit_s_, true};
-  return is_running_ && !is_zooming_ && span.duration_s() >= constant_span_.duration_s() ? span : constant_span_;
+  const std::vector<ConstantSpan> spans = constant_spans();
+  // Of equally long ones the last.
+  const auto longest = std::max_element(spans.rbegin(), spans.rend(), [](const ConstantSpan& a, const ConstantSpan& b) {
+    return a.duration_s() < b.duration_s();
+  });
+  return longest == spans.rend() ? ConstantSpan{} : *longest;
+}
+
+std::vector<HybridObserver::ConstantSpan> HybridObserver::constant_spans() const {
+  std::vector<ConstantSpan> spans = constant_spans_;
+  if (is_running_ && !is_zooming_) spans.push_back({constant_since_s_, last_fit_s_, true});
+  return spans;
 }
 
 }  // namespace alidade

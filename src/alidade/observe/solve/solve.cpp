@@ -2,6 +2,7 @@
 #include <sstream>
 
 #include "alidade/observe/checks/cause_search.h"
+#include "alidade/observe/checks/constant_spans.h"
 
 namespace alidade {
 namespace {
@@ -331,6 +332,7 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   if (may_be_misread(report)) {
     report.misread = misread.is_sought ? misread.words : misread_rotation(log, config, report, progress).words;
   }
+  if (is_answer(report)) compare_constant_spans(log, config, progress, report);
   return report;
 }
 

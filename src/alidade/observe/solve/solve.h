@@ -31,9 +31,10 @@ struct ObserveSolution : ObserveReport {
   /// The reference: the rows of the longest time in which the intrinsics did not change, adjusted together.
   /// Its information is the bound's.
   Adjustment reference;
-  StatedCovariance stated;         ///< Of the reference.
-  RotationJitter jitter;           ///< Of its frames.
-  std::vector<CauseScore> causes;  ///< Score tests of what was taken as exact.
+  StatedCovariance stated;                                   ///< Of the reference.
+  RotationJitter jitter;                                     ///< Of its frames.
+  std::vector<CauseScore> causes;                            ///< Score tests of what was taken as exact.
+  std::vector<HybridObserver::ConstantSpan> constant_spans;  ///< Of ObserveMethod::hybrid.
   /// The answer minus the reference over their σ, the largest of fx, fy, cx, cy, where both are of the same camera.
   double from_reference = 0.0;
   ObserveNuisances estimated;  ///< What was, in the end, beside fx, fy, cx, cy.

@@ -125,6 +125,7 @@ class Observation {
     if (!observer.is_running()) return;
     observer.settle();
     report_.sigma_px = observer.sigma_px();
+    report_.constant_spans = observer.constant_spans();
     const HybridObserver::ConstantSpan span = observer.longest_constant_span();
     report_.reference_from_s = span.from_s;
     report_.reference_until_s = span.until_s;
@@ -191,8 +192,6 @@ class Observation {
     step.k1 = camera.k1;
   }
 
-  [[nodiscard]] Eigen::Vector4d start_px() const { return report_.scale.intrinsics_px(start_.k); }
-
   template <typename Observer>
   void run_regression(Observer& observer) {
     for (std::size_t k = 0; k < frames_.size(); ++k) {
@@ -213,7 +212,7 @@ class Observation {
     FlowFilterConfig flow;
     flow.num_points = log_.num_points;
     flow.scale = report_.scale;
-    flow.start = start_px();
+    flow.start = report_.scale.intrinsics_px(start_.k);
     if (config_.sigma_px) flow.sigma_px = *config_.sigma_px;
     FlowFilter observer(flow);
     run_regression(observer);
@@ -223,7 +222,7 @@ class Observation {
     FangConfig fang;
     fang.num_points = log_.num_points;
     fang.scale = report_.scale;
-    fang.start = start_px();
+    fang.start = report_.scale.intrinsics_px(start_.k);
     fang.profile = config_.profile;
     if (config_.sigma_px) fang.sigma_px = *config_.sigma_px;
     fang.roll_columns = log_.source != RotationSource::rate || log_.has_roll_rate;
@@ -306,8 +305,8 @@ class Observation {
       state_covariance(layout);
     }
     list_quantities(layout, bound);
-    if (has_final_) state_steps();
     if (!has_final_) return;
+    state_steps();
     report_.status =
         is_observable(report_, bound) ? ObserveSolution::Status::ok : ObserveSolution::Status::unobservable;
   }

@@ -43,6 +43,7 @@ struct RigFault {
   std::string name;       ///< "head2.pan_zero_rad", "head1.base_rx_rad", "head2.camera.f", "head2.clock_s".
   double off = 0.0;       ///< By how much it is off if it alone is, in its unit: the true value − the file's.
   double z = 0.0;         ///< Of a right rig normal with mean 0 and σ 1, the sign left out.
+  double z_refit = 0.0;   ///< The same by a fit of it where it explains about the most; else z.
   std::size_t head = 0;   ///< Index in the rig's list of heads.
   Eigen::VectorXd moved;  ///< The same of the head's rows in RigUncertainty.
 };

@@ -109,22 +109,27 @@ void eliminate_errors(const RigUncertainty& errors, PathEquations& given) {
   const Eigen::MatrixXd across = given.information * factor;
   const Eigen::MatrixXd inverse =
       inverse_symmetric(factor.transpose() * across + Eigen::MatrixXd::Identity(errors.num(), errors.num()));
-  given.g -= across * (inverse * (factor.transpose() * given.g));
+  const Eigen::VectorXd pull = factor.transpose() * given.g;
+  given.cost -= pull.dot(inverse * pull);
+  given.g -= across * (inverse * pull);
   given.information -= across * inverse * across.transpose();
 }
 
 bool is_of_clock(const RigFault& fault) { return fault.name.ends_with("clock_s"); }
 
 double ln_gain(const RigFault& fault) { return 0.5 * fault.z * fault.z; }
+double refit_ln_gain(const RigFault& fault) { return 0.5 * fault.z_refit * fault.z_refit; }
+double both_gains(const RigFault& fault) { return ln_gain(fault) + refit_ln_gain(fault); }
 
 /// Of parameters that do the same the one that is tested first is named first.
 void put_first(std::vector<RigFault>& faults, std::span<const std::string> order) {
   constexpr double same = 0.1;
-  std::ranges::stable_sort(faults, std::ranges::greater{}, &RigFault::z);
+  std::ranges::stable_sort(faults, std::ranges::greater{}, both_gains);
   if (faults.empty()) return;
   const auto rank = [&](const RigFault& fault) { return std::ranges::find(order, fault.name) - order.begin(); };
+  const auto root = [](const RigFault& fault) { return std::sqrt(both_gains(fault)); };
   auto best = faults.begin();
-  for (auto fault = faults.begin(); fault != faults.end() && faults.front().z - fault->z < same; ++fault)
+  for (auto fault = faults.begin(); fault != faults.end() && root(faults.front()) - root(*fault) < same; ++fault)
     if (fault->head == faults.front().head && rank(*fault) < rank(*best)) best = fault;
   std::rotate(faults.begin(), best, best + 1);
 }
@@ -151,26 +156,86 @@ struct AllTested {
   }
 };
 
+/// How equations are made: the target's motion as it is smoothed and as it may be, and noise.
+struct Making {
+  TrackerConfig calm;
+  double free_m_s2 = 0.0, noise = 1.0;
+
+  explicit Making(const TrackerConfig& config) : calm(config) {
+    // A wrong rig makes a target seem more manoeuvring than any is.
+    constexpr double max_m_s2 = 3.0, freely = 10.0, min_free_m_s2 = 10.0;
+    calm.sigma_a_m_s2 = std::min(max_m_s2, config.sigma_a_m_s2);
+    free_m_s2 = std::max(min_free_m_s2, freely * calm.sigma_a_m_s2);
+  }
+
+  /// Of noise as stated; none where observations determine no path.
+  [[nodiscard]] std::optional<PathEquations> raw(std::span<const TargetObservation> observations,
+                                                 std::span<const RigHead> heads) const {
+    const auto path = smooth_path(observations, heads, calm);
+    if (!path) return std::nullopt;
+    PathEquations given = path_equations(observations, heads, *path, calm, free_m_s2);
+    if (!given.information.allFinite() || !given.g.allFinite()) return std::nullopt;
+    return given;
+  }
+
+  /// What the errors that the rig file allows leave of them.
+  [[nodiscard]] PathEquations weighed(PathEquations given) const {
+    given.information /= noise;
+    given.g /= noise;
+    given.cost /= noise;
+    eliminate_errors(calm.errors, given);
+    return given;
+  }
+};
+
+/// What the observations gain where the rig is without the fault, by a step more from there: the score test's parabola
+/// may be too narrow for one parameter and too wide for another that nearly does the same.
+void refit(RigFault& fault, std::span<const TargetObservation> used, std::span<const RigHead> heads,
+           const Making& making, double cost_before) {
+  WithoutFault right = without_fault(used, heads, fault);
+  std::ranges::stable_sort(right.observations, {}, &TargetObservation::t_capture_s);
+  const auto raw = making.raw(right.observations, right.heads);
+  if (!raw) return;
+  const PathEquations given = making.weighed(*raw);
+  Eigen::VectorXd direction = Eigen::VectorXd::Zero(given.g.size());
+  Eigen::Index first = 0;
+  for (std::size_t h = 0; h < fault.head; ++h) first += num_head_params + params(heads[h].camera.lens).size() + 1;
+  direction.segment(first, fault.moved.size()) = fault.moved;
+  const double weight = direction.dot(given.information * direction), pull = direction.dot(given.g);
+  if (!(weight > 0.0)) return;
+  const double more = pull / weight;  // of what it was off by
+  fault.z_refit = std::sqrt(std::max(0.0, cost_before - given.cost + pull * pull / weight));
+  fault.off *= 1.0 + more;
+  fault.moved *= 1.0 + more;
+}
+
+/// Where one is significant, and parameters explain all but noise (of mirrored images none does), those that explain
+/// about as much are compared beyond the score test; not clocks, whose
+/// shift changes the path's own probability.
+void compare(std::vector<RigFault>& faults, std::span<const TargetObservation> used, std::span<const RigHead> heads,
+             const Making& making, double cost_before) {
+  constexpr double near = 20.0, significant = 3.5, max_noise = 1.5;
+  constexpr std::size_t most = 8;
+  if (faults.empty() || !(faults.front().z > significant) || !(making.noise < max_noise)) return;
+  const double best = ln_gain(faults.front());
+  for (std::size_t k = 0; k < std::min(most, faults.size()); ++k)
+    if (!is_of_clock(faults[k]) && best - ln_gain(faults[k]) < near) refit(faults[k], used, heads, making, cost_before);
+}
+
 }  // namespace
 
 RigTests rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                     const TrackerConfig& config) {
   constexpr std::size_t min_observations = 16;
-  // A wrong rig makes a target seem more manoeuvring than any is.
-  constexpr double max_m_s2 = 3.0, freely = 10.0, min_free_m_s2 = 10.0, unobservable = 1e-7;
+  constexpr double unobservable = 1e-7;
   const std::vector<TargetObservation> used = in_line(observations, heads);
   if (used.size() < min_observations) return {};
-  TrackerConfig calm = config;
-  calm.sigma_a_m_s2 = std::min(max_m_s2, config.sigma_a_m_s2);
-  const auto path = smooth_path(used, heads, calm);
-  if (!path) return {};
-  PathEquations given = path_equations(used, heads, *path, calm, std::max(min_free_m_s2, freely * calm.sigma_a_m_s2));
-  if (!given.information.allFinite() || !given.g.allFinite()) return {};
-  AllTested tested(heads, given.g.size());
-  const double noise = noise_factor(given, tested.large);
-  given.information /= noise;
-  given.g /= noise;
-  eliminate_errors(config.errors, given);
+  Making making(config);
+  const auto raw = making.raw(used, heads);
+  if (!raw) return {};
+  AllTested tested(heads, raw->g.size());
+  making.noise = noise_factor(*raw, tested.large);
+  const PathEquations given = making.weighed(*raw);
   RigTests tests;
   for (std::size_t k = 0; k < tested.faults.size(); ++k) {
     RigFault& fault = tested.faults[k];
@@ -178,13 +243,16 @@ RigTests rig_faults(std::span<const TargetObservation> observations, std::span<c
     const Eigen::VectorXd direction = tested.large.col(static_cast<Eigen::Index>(k));
     const double weight = direction.dot(given.information * direction), pull = direction.dot(given.g);
     const double share = pull / weight;  // of what is large
-    const bool is_seen = weight > unobservable * direction.cwiseAbs2().dot(given.seen) / noise;
+    const bool is_seen = weight > unobservable * direction.cwiseAbs2().dot(given.seen) / making.noise;
     if (is_seen) tests.power.back().z_per_unit = std::sqrt(weight) / fault.off;
     if (is_seen && std::abs(share) < 1.0) fault.z = std::abs(pull) / std::sqrt(weight);
+    fault.z_refit = fault.z;
     fault.off *= share;
     fault.moved *= fault.off;
   }
   std::erase_if(tested.faults, [](const RigFault& fault) { return !(fault.z > 0.0); });
+  std::ranges::stable_sort(tested.faults, std::ranges::greater{}, &RigFault::z);
+  compare(tested.faults, used, heads, making, given.cost);
   put_first(tested.faults, tested.names);
   tests.faults = std::move(tested.faults);
   return tests;
@@ -192,7 +260,7 @@ RigTests rig_faults(std::span<const TargetObservation> observations, std::span<c
 
 bool is_alike(const RigFault& first, const RigFault& fault) {
   constexpr double clear = 3.0;
-  return ln_gain(first) - ln_gain(fault) < clear;
+  return ln_gain(first) - ln_gain(fault) < clear || refit_ln_gain(first) - refit_ln_gain(fault) < clear;
 }
 
 std::vector<RigFault> alike_per_head(const TrackReport& report) {

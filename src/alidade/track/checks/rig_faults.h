@@ -24,7 +24,8 @@ struct RigTests {
 [[nodiscard]] RigTests rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                   const TrackerConfig& config);
 
-/// Whether a fault explains the observations as well as the first: of so much ln p a choice may err once in 20.
+/// Whether a fault explains the observations as well as the first, by the score test or refitted: of so much ln p a
+/// choice may err once in 20.
 [[nodiscard]] bool is_alike(const RigFault& first, const RigFault& fault);
 
 /// The first fault, if it is significant, and of each head the first of those that explain the observations as well.

@@ -154,6 +154,71 @@ TEST(RigFaults, AreNamed) {
   }
 }
 
+/// Where the score test prefers one head and a fit another, both are named: of three heads in a row with one wrong
+/// focal length the score test alone named another one in 7 of 112 tracks of an independent simulator.
+TEST(RigFaults, WhatOnlyOneOfTwoTestsPrefersIsNotNamedAlone) {
+  const auto of = [](std::size_t head, double z, double z_refit) {
+    RigFault fault;
+    fault.name = "camera.f";
+    fault.head = head;
+    fault.z = z;
+    fault.z_refit = z_refit;
+    return fault;
+  };
+  TrackReport report;
+  report.faults = {of(1, 10.0, 10.0), of(2, 9.4, 10.3), of(0, 8.0, 8.0)};
+  const std::vector<RigFault> alike = alike_per_head(report);
+  ASSERT_EQ(alike.size(), 2u);
+  EXPECT_EQ(alike[0].head, 1u);
+  EXPECT_EQ(alike[1].head, 2u);
+}
+
+/// Three heads side by side, half a metre apart, and a target that goes by sines of its own in each draw.
+TrackScene drawn_scene(std::uint64_t seed) {
+  TrackScene scene = scene_of(3);
+  scene.heads[1].head.world_from_base.translation = Eigen::Vector3d(0.5, 0.0, 0.0);
+  scene.heads[2].head.world_from_base.translation = Eigen::Vector3d(1.0, 0.0, 0.0);
+  scene.duration_s = 20.0;
+  Draws draws(seed);
+  Eigen::Matrix<double, 3, 4> rate, phase, size;
+  for (Eigen::Index k = 0; k < rate.size(); ++k) {
+    rate(k) = draws.uniform(0.2, 2.2);
+    phase(k) = draws.uniform(0.0, 6.3);
+    size(k) = (k % 3 == 1 ? 0.2 : 0.5) / (1.0 + rate(k)) * draws.uniform(0.5, 1.5);
+  }
+  scene.position = [=](double t_s) {
+    Eigen::Vector3d at(0.2, 0.0, 2.3);
+    for (Eigen::Index k = 0; k < rate.size(); ++k) at[k % 3] += size(k) * std::sin(rate(k) * t_s + phase(k));
+    return at;
+  };
+  return scene;
+}
+
+/// A focal length off by 3 % of one of three: the head is named, or named beside the other, and never another alone.
+TEST(RigFaults, OfThreeHeadsNoOtherIsNamedAlone) {
+  const int draws = testing::trials(4);
+  int seen = 0, other_alone = 0;
+  for (int seed = 1; seed <= draws; ++seed) {
+    const TrackScene scene = drawn_scene(static_cast<std::uint64_t>(seed));
+    const auto wrong = static_cast<std::size_t>(seed % 3);
+    Rig rig;
+    rig.heads.assign(scene.heads.begin(), scene.heads.end());
+    Eigen::VectorXd lens = params(rig.heads[wrong].camera.lens);
+    lens.head<2>() /= 1.03;
+    rig.heads[wrong].camera.lens = with_params(rig.heads[wrong].camera.lens, lens);
+    const auto observations = as_they_were_taken(testing::observations_of(scene, static_cast<std::uint64_t>(seed)));
+    TrackReport report;
+    report.faults = rig_faults(observations, rig.heads, {}).faults;
+    const std::vector<RigFault> alike = alike_per_head(report);
+    if (alike.empty()) continue;
+    ++seen;
+    other_alone += std::ranges::count(alike, wrong, &RigFault::head) == 0 ? 1 : 0;
+  }
+  EXPECT_GE(2 * seen, draws);
+  EXPECT_LE(other_alone, draws / 20);
+  RecordProperty("seen", std::to_string(seen));
+}
+
 /// Of three heads what is wrong within the plane of their rays is seen: the pan zero of the second, off by 7 of the rig
 /// file's σ. Two of eight such tracks were good, and up to 6.3σ off.
 TEST(RigFaults, APanZeroOfThreeHeadsIsNotSilent) {

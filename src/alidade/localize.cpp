@@ -32,6 +32,7 @@ void add_scale(const LocalizeConfig& config, Localization& result) {
       apply_scale(*read, result);
       result.is_scale_read = result.scale_known = true;
     }
+    if (result.has_target) widen_by_contradictions(config.filter.sigma_scale, result);
   }
   add_imu_scale(config, result);
 }

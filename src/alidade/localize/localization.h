@@ -79,6 +79,8 @@ struct SensorScale {
   double lag_s = 0.0;                 ///< Time constant of the filter of a depth sensor or odometry, if any: corrected.
   double acceleration = 0.0;          ///< RMS of the camera's by this scale, over the one that is given.
   double jump_m = 0.0, jump_s = 0.0;  ///< By which a depth sensor reads more from a time on, where it does: corrected.
+  /// Log of another scale over this one, that a rangefinder's readings have as well, of another surface; else 0.
+  double other_log_scale = 0.0;
 };
 
 /// Mean radial residual in rings about the principal point.
@@ -125,6 +127,7 @@ struct Localization {
   bool scale_known = false;
   bool is_scale_read = false;              ///< Known by `sensor_scales`, and not by a target.
   std::vector<SensorScale> sensor_scales;  ///< Of what readings there were.
+  double sigma_target_scale = 0.0;         ///< Of the scale by where the target's points are, relative.
   std::optional<ImuEstimate> imu;          ///< Where one was given.
   bool has_target = false;                 ///< Known points were given,
   bool is_in_map = false;                  ///< as a map that was saved.

@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <utility>
 
 #include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
+#include "alidade/localize/checks/beam_surfaces.h"
 #include "alidade/localize/checks/scale_readings.h"
 
 // A rangefinder's scale: where its beam meets the surface that the map's points lie on.
@@ -13,54 +16,60 @@ namespace alidade {
 
 namespace {
 
-struct NearPoint {
-  double off = 0.0;  ///< From the beam, over the depth.
-  Eigen::Vector3d point_in_world;
-};
-
 struct BeamScale {
   double log_scale = 0.0, roughness = 0.0;                 ///< The points off their plane, over the distance.
   double of_offset = 0.0;                                  ///< ∂scale / ∂(length of all readings). [units/m]
   Eigen::Vector2d of_direction = Eigen::Vector2d::Zero();  ///< ∂scale / ∂(direction of the beam). [units/rad]
 };
 
-/// Metres a unit where the beam hits the plane through the points that are nearest to it. None: too few around it.
-std::optional<BeamScale> scale_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
-                                  std::span<const MapPoint> map) {
-  constexpr std::size_t num_near = 6;
-  constexpr double far_off = 0.25, max_roughness = 0.1;
-  const Eigen::Vector3d hit_in_cam = point_at(beam, range_m);
+/// Which surface a beam meets.
+enum class SurfaceBy {
+  nearest,  ///< Through the nearest points.
+  around,   ///< Any through points in one plane all around the beam: where one stands before another, which one do the
+            ///< readings say together.
+};
+
+std::vector<BeamSurface> surfaces_of(const Eigen::Vector3d& hit_in_cam, std::span<const Eigen::Vector3d> points_in_cam,
+                                     SurfaceBy by) {
   const Eigen::Vector3d direction = hit_in_cam.normalized();  // the camera's centre alone has no scale
-  const Rigid3 cam_from_world = world_from_cam.inverse();
-  std::vector<NearPoint> near;
-  for (const MapPoint& point : map) {
-    const Eigen::Vector3d point_in_cam = cam_from_world * point.point_in_world;
-    const double along = direction.dot(point_in_cam);
-    if (!(along > 0.0)) continue;
-    const double off = (point_in_cam - along * direction).norm() / along;
-    if (off < far_off) near.push_back({off, point_in_cam});
-  }
-  if (near.size() < num_near) return std::nullopt;
-  std::ranges::nth_element(near, near.begin() + num_near - 1, {}, &NearPoint::off);
-  near.resize(num_near);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const NearPoint& point : near) middle += point.point_in_world / static_cast<double>(num_near);
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const NearPoint& point : near)
-    scatter += (point.point_in_world - middle) * (point.point_in_world - middle).transpose();
-  const SymmetricEigen3 eigen = symmetric_eigen3(scatter);
-  const Eigen::Vector3d normal = eigen.vectors.col(0);
-  const double roughness = std::sqrt(std::max(eigen.values[0], 0.0) / static_cast<double>(num_near));
-  const double to_plane = normal.dot(middle), of_hit = normal.dot(hit_in_cam);
-  const double of_beam = normal.dot(beam.scale * beam.direction_in_cam);
-  constexpr double grazing = 0.3;
-  if (std::abs(of_hit) < grazing * hit_in_cam.norm() || roughness > max_roughness * middle.norm()) return std::nullopt;
+  if (by == SurfaceBy::around) return surfaces_around(direction, points_in_cam);
+  const auto surface = nearest_surface(direction, points_in_cam);
+  return surface ? std::vector{*surface} : std::vector<BeamSurface>();
+}
+
+std::optional<BeamScale> scale_on(const BeamSurface& surface, const Beam& beam, double range_m) {
+  constexpr double max_roughness = 0.1, grazing = 0.3;
+  const Eigen::Vector3d hit_in_cam = point_at(beam, range_m);
+  const double to_plane = surface.normal.dot(surface.middle), of_hit = surface.normal.dot(hit_in_cam);
+  const double of_beam = surface.normal.dot(beam.scale * beam.direction_in_cam);
+  const double distance = surface.middle.norm();
+  if (std::abs(of_hit) < grazing * hit_in_cam.norm() || surface.roughness > max_roughness * distance)
+    return std::nullopt;
   // n·X = c in units; where the beam hits it is s c in metres.
   const double scale = of_hit / to_plane;
   if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
-  const Eigen::RowVectorXd of_params = normal.transpose() * J_point_beam(beam, range_m) / to_plane;
-  return BeamScale{std::log(scale), roughness / middle.norm(), of_beam / to_plane,
+  const Eigen::RowVectorXd of_params = surface.normal.transpose() * J_point_beam(beam, range_m) / to_plane;
+  return BeamScale{std::log(scale), surface.roughness / distance, of_beam / to_plane,
                    of_params.segment<2>(beam_direction_param).transpose()};
+}
+
+/// Metres a unit where the beam hits a plane through points near it, for each such plane.
+std::vector<BeamScale> scales_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
+                                 std::span<const MapPoint> map, SurfaceBy by) {
+  const Rigid3 cam_from_world = world_from_cam.inverse();
+  std::vector<Eigen::Vector3d> points_in_cam;
+  points_in_cam.reserve(map.size());
+  for (const MapPoint& point : map) points_in_cam.push_back(cam_from_world * point.point_in_world);
+  std::vector<BeamScale> scales;
+  for (const BeamSurface& surface : surfaces_of(point_at(beam, range_m), points_in_cam, by))
+    if (auto scale = scale_on(surface, beam, range_m)) scales.push_back(*scale);
+  return scales;
+}
+
+std::optional<BeamScale> scale_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
+                                  std::span<const MapPoint> map) {
+  const std::vector<BeamScale> scales = scales_at(world_from_cam, beam, range_m, map, SurfaceBy::nearest);
+  return scales.empty() ? std::nullopt : std::optional(scales.front());
 }
 
 /// Of the log of the scale by the beam's parameters: the median over the readings, since a moved beam may hit between
@@ -95,6 +104,68 @@ double sigma_by_beam(std::span<const RangeReading> readings, const Beam& beam, s
   return std::sqrt(std::max(along.dot(beam.cov * along), 0.0));
 }
 
+/// One scale of each reading, and ln of another over it that at least half as many of them have.
+struct AgreeingScales {
+  std::vector<BeamScale> scales;
+  double other_log_scale = 0.0;
+};
+
+/// Of each reading the scale that most of the others have, too: a kernel's mode. None where too few agree: the beam may
+/// have met none of these surfaces, as within a frame of points.
+std::optional<AgreeingScales> agreeing(std::span<const std::vector<BeamScale>> of_readings) {
+  constexpr double width = 0.01, apart = 3.0, half = 0.5, enough = 0.6;
+  const auto nearest = [](const std::vector<BeamScale>& scales, double log_scale) {
+    return *std::ranges::min_element(scales, {},
+                                     [&](const BeamScale& each) { return std::abs(each.log_scale - log_scale); });
+  };
+  std::vector<std::pair<double, double>> supports;  // and scales
+  for (const std::vector<BeamScale>& at : of_readings)
+    for (const BeamScale& one : at) {
+      double sum = 0.0;
+      for (const std::vector<BeamScale>& scales : of_readings)
+        sum += std::exp(-0.5 * std::pow((nearest(scales, one.log_scale).log_scale - one.log_scale) / width, 2));
+      supports.emplace_back(sum, one.log_scale);
+    }
+  std::ranges::sort(supports, std::greater());
+  const auto [most, mode] = supports.front();
+  if (most < enough * static_cast<double>(of_readings.size())) return std::nullopt;
+  AgreeingScales agreeing;
+  for (const std::vector<BeamScale>& scales : of_readings) agreeing.scales.push_back(nearest(scales, mode));
+  for (const auto& [sum, log_scale] : supports)
+    if (agreeing.other_log_scale == 0.0 && sum > half * most && std::abs(log_scale - mode) > apart * width)
+      agreeing.other_log_scale = log_scale - mode;
+  return agreeing;
+}
+
+constexpr std::size_t num_blocks = 10;
+
+/// Of each reading that has a surface its scales, in order of time.
+std::vector<std::vector<BeamScale>> scales_by(SurfaceBy by, std::span<const RangeReading> readings, const Beam& beam,
+                                              std::span<const PathStep> path, std::span<const MapPoint> map) {
+  std::vector<std::vector<BeamScale>> of_readings;
+  for (const RangeReading& reading : readings) {
+    const auto pose = pose_at(path, reading.t_s);
+    if (!pose) continue;
+    auto scales = scales_at(*pose, beam, reading.range_m, map, by);
+    if (!scales.empty()) of_readings.push_back(std::move(scales));
+  }
+  return of_readings;
+}
+
+/// One scale of each reading: by planes all around the beam, where enough have them and agree.
+AgreeingScales scales_of(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
+                         std::span<const MapPoint> map) {
+  constexpr std::size_t enough = 3 * num_blocks;
+  const auto around = scales_by(SurfaceBy::around, readings, beam, path, map);
+  if (around.size() >= enough)
+    if (auto agree = agreeing(around)) return *std::move(agree);
+  AgreeingScales nearest;
+  for (const std::vector<BeamScale>& each : scales_by(SurfaceBy::nearest, readings, beam, path, map))
+    nearest.scales.push_back(each.front());
+  if (nearest.scales.size() < enough) nearest.scales.clear();
+  return nearest;
+}
+
 /// Those near their median.
 void reject_far(std::vector<BeamScale>& scales) {
   constexpr double far = 4.0;  // of their robust σ
@@ -105,8 +176,6 @@ void reject_far(std::vector<BeamScale>& scales) {
   const double limit = far * normal_from_mad * median_of(std::move(sizes));
   std::erase_if(scales, [&](const BeamScale& each) { return std::abs(each.log_scale - median) > limit; });
 }
-
-constexpr std::size_t num_blocks = 10;
 
 /// ln of the scale, with the scatter of blocks of time as its σ.
 struct MeanScale {
@@ -204,18 +273,19 @@ std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const Be
   return found;
 }
 
+constexpr double instrument_m = 0.1;  ///< An offset of the readings is about as long as that, from its other end.
+
 /// How much of the scale an offset of the readings would be that is as long as an instrument, measured from its other
 /// end, where no covariance of the beam and not the readings themselves exclude it: a surface's shape, or a distance
 /// that hardly changes, hides it. 0: it would show.
 double hidden_offset(std::span<const BeamScale> scales, const Beam& beam, const std::optional<FoundFault>& offset,
                      double scale) {
-  constexpr double length_m = 0.1;
   constexpr double sigmas = 3.3;  // an offset so large is beyond 2σ, that is in doubt, in five of six cases
   if (beam.cov.diagonal().maxCoeff() > 0.0) return 0.0;
-  if (offset && sigmas * offset->sigma_by[0] < length_m) return 0.0;
+  if (offset && sigmas * offset->sigma_by[0] < instrument_m) return 0.0;
   double of_offset = 0.0;
   for (const BeamScale& each : scales) of_offset += std::abs(each.of_offset) / static_cast<double>(scales.size());
-  return length_m * of_offset / scale;
+  return instrument_m * of_offset / scale;
 }
 
 /// Where the readings say that they are all too long, or that the beam points elsewhere, that which explains more is
@@ -234,9 +304,9 @@ void add_faults(std::span<const BeamScale> scales, const Beam& beam, double of_s
     read.sigma_rel = std::hypot(read.sigma_rel, found.sigma_log_scale);
   };
   const double before = read.scale;
-  const auto doubt = [&](const std::optional<FoundFault>& found, const BeamFault& fault) {
+  const auto doubt = [&](const std::optional<FoundFault>& found, const BeamFault& fault, double believed) {
     if (found && found->T2 > fault.half_clear)
-      read.sigma_rel = std::hypot(read.sigma_rel, std::log(found->fit.scale / before));
+      read.sigma_rel = std::hypot(read.sigma_rel, believed * std::log(found->fit.scale / before));
   };
   if (is_more_direction) {
     put(*direction);
@@ -245,8 +315,10 @@ void add_faults(std::span<const BeamScale> scales, const Beam& beam, double of_s
     put(*offset);
     read.offset_m = offset->fit.by[0];
   } else {
-    doubt(offset, offset_fault);
-    doubt(direction, direction_fault);
+    // Where hardly anything determines an offset, what an instrument has is surer.
+    const double known = offset ? std::pow(offset->sigma_by[0] / instrument_m, 2) : 0.0;
+    doubt(offset, offset_fault, 1.0 / (1.0 + known));
+    doubt(direction, direction_fault, 1.0);
     read.hidden_offset_rel = hidden_offset(scales, beam, offset, before);
   }
 }
@@ -255,25 +327,19 @@ void add_faults(std::span<const BeamScale> scales, const Beam& beam, double of_s
 
 std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                         std::span<const PathStep> path, std::span<const MapPoint> map) {
-  std::vector<BeamScale> scales;  // in order of time
-  double roughness = 0.0;
-  for (const RangeReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s);
-    const auto scale = pose ? scale_at(*pose, beam, reading.range_m, map) : std::nullopt;
-    if (!scale) continue;
-    scales.push_back(*scale);
-    roughness += scale->roughness;
-  }
-  if (scales.size() < 3 * num_blocks) return std::nullopt;
+  auto [scales, other_log_scale] = scales_of(readings, beam, path, map);
+  if (scales.empty()) return std::nullopt;
   const std::size_t num_given = scales.size();
   reject_far(scales);
   if (scales.size() < num_blocks) return std::nullopt;
+  double roughness = 0.0;
+  for (const BeamScale& each : scales) roughness += each.roughness / static_cast<double>(scales.size());
   const MeanScale mean = mean_of_blocks(scales);
   ReadScale read{std::exp(mean.log_scale), 0.0, scales.size(), num_given - scales.size()};
   // A curved surface is on one side of every plane through its points, by about as much as they are off it.
-  const double of_surface = roughness / static_cast<double>(num_given);
-  read.sigma_rel = std::hypot(mean.sigma, sigma_by_beam(readings, beam, path, map), of_surface);
-  add_faults(scales, beam, of_surface, read);
+  read.sigma_rel = std::hypot(mean.sigma, sigma_by_beam(readings, beam, path, map), roughness);
+  read.other_log_scale = other_log_scale;
+  add_faults(scales, beam, roughness, read);
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }

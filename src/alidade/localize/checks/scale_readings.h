@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <string>
@@ -25,6 +26,9 @@ struct ReadScale {
   double hidden_offset_rel = 0.0;
   double lag_s = 0.0;                 ///< Time constant of the filter of a depth sensor or odometry, where it has one.
   double jump_m = 0.0, jump_s = 0.0;  ///< By which a depth sensor reads more from a time on, where it does.
+  /// ln of another scale over this one, that at least half as many readings of a rangefinder have, of a surface before
+  /// or behind; else 0.
+  double other_log_scale = 0.0;
 };
 
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
@@ -51,7 +55,8 @@ struct ReadScale {
 /// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
 /// readings near their median, with the scatter of blocks of them as its σ. Where their distances say so, all of them
 /// are too long by one length, or where their places say so the beam points elsewhere: then that is estimated, too.
-/// None: too few readings with points around them. σ of the beam is in it; where its file has none, 0.5 % of its scale.
+/// None: too few readings with points around them. Of two surfaces one behind the other that is met which gives most
+/// readings one scale. σ of the beam is in it; where its file has none, 0.5 % of its scale.
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 
@@ -67,6 +72,19 @@ struct ReadScale {
 void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result);
 /// What an IMU said of it when the path was solved, into the same.
 void add_imu_scale(const LocalizeConfig& config, Localization& result);
+/// A sensor's scale against a target's: ln of their ratio, and its σ, that of where the target's points are included.
+struct ScaleDifference {
+  double log_ratio = 0.0, sigma = 1.0;
+  [[nodiscard]] double sigmas() const { return std::abs(log_ratio) / sigma; }
+};
+[[nodiscard]] ScaleDifference difference_from_target(const SensorScale& sensor, double sigma_target_scale);
+/// Of the scale by known points, relative, as sure as each is alone.
+[[nodiscard]] double sigma_target_scale(std::span<const MapPoint> map);
+/// Where a sensor contradicts a target, which of them is wrong is not known: the difference is in the path's σ.
+/// `sigma_scale`: of the target's size, as given.
+void widen_by_contradictions(double sigma_scale, Localization& result);
+constexpr double contradicts_from = 3.0;  ///< In σ.
+
 /// All of them together, the surer one counting for more. None: nothing determines it.
 [[nodiscard]] std::optional<ReadScale> scale_of(const Localization& result);
 

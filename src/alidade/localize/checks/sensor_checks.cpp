@@ -3,6 +3,7 @@
 
 #include "alidade/geometry/degree.h"
 #include "alidade/localize/checks/judge.h"
+#include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/path/path_doubt.h"
 
 // What is said of sensors beside the camera, and by them of the scale.
@@ -78,21 +79,31 @@ std::string unread_text(const SensorScale& sensor, const Localization& report) {
 }
 
 /// The path's scale by a sensor against that by the first of them, where that has given it, or by the target.
-void add_agreement(const SensorScale& sensor, const SensorScale* first, Verdict& verdict) {
-  constexpr double care_z = 3.0, bad_z = 6.0;
-  const double sigma = std::hypot(sensor.sigma_rel, first ? first->sigma_rel : 0.0);
-  const double change = std::log(sensor.scale / (first ? first->scale : 1.0)), z = std::abs(change) / sigma;
+void add_agreement(const SensorScale& sensor, const SensorScale* first, const Localization& report, Verdict& verdict) {
+  constexpr double bad_z = 6.0;
+  constexpr double power_z = contradicts_from + 2.33;  // 99 %
+  const ScaleDifference difference =
+      first ? ScaleDifference{std::log(sensor.scale / first->scale), std::hypot(sensor.sigma_rel, first->sigma_rel)}
+            : difference_from_target(sensor, report.sigma_target_scale);
+  const double z = difference.sigmas();
   const std::string by = first ? "the " + first->sensor : "the target";
-  verdict.checks.push_back({sensor.sensor, state_of(z, care_z, bad_z),
-                            z > care_z ? "the path is " + text_of(100.0 * change, 2) + " % longer by the " +
-                                             sensor.sensor + " than by " + by + " (" + text_of(z, 2) + "σ)"
-                                       : "the " + sensor.sensor + " agrees with " + by + " on the scale, within ± " +
-                                             text_of(300.0 * sigma, 2) + " % (3σ)",
-                            z, care_z, "σ", "path"});
+  const std::string percent =
+      text_of(100.0 * std::abs(difference.log_ratio), 2) + " ± " + text_of(100.0 * difference.sigma, 2) + " %";
+  const std::string which = first ? ""
+                                  : ": one of the two is wrong (the target's size, say; its σ is --sigma-scale), and "
+                                    "the path's σ includes that";
+  verdict.checks.push_back(
+      {sensor.sensor, state_of(z, contradicts_from, bad_z),
+       z > contradicts_from ? "the path is " + percent + (difference.log_ratio > 0.0 ? " longer" : " shorter") +
+                                  " by the " + sensor.sensor + " than by " + by + " (" + text_of(z, 2) + "σ)" + which
+                            : "the " + sensor.sensor + " agrees with " + by + " on the scale; a difference of " +
+                                  text_of(100.0 * power_z * difference.sigma, 2) + " % would show at 99 %",
+       z, contradicts_from, "σ", "path"});
 }
 
 void add_rejected(const SensorScale& sensor, Verdict& verdict) {
-  constexpr double many = 0.2;
+  // A beam may meet what the map has no points of.
+  const double many = sensor.sensor == "rangefinder" ? 0.5 : 0.2;
   const double rejected = share(sensor.num_rejected, sensor.num_used + sensor.num_rejected);
   if (rejected > many)
     verdict.checks.push_back(
@@ -123,7 +134,7 @@ void add_sensors(const Localization& report, Verdict& verdict) {
     }
     add_readings(each, verdict);
     if (report.is_scale_read) add_hidden(each, verdict);
-    if (!report.is_scale_read || first) add_agreement(each, report.is_scale_read ? first : nullptr, verdict);
+    if (!report.is_scale_read || first) add_agreement(each, report.is_scale_read ? first : nullptr, report, verdict);
     add_rejected(each, verdict);
     if (first == nullptr) first = &each;
   }

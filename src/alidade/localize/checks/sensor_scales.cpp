@@ -299,7 +299,12 @@ void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Lo
                read->lag_s,
                read->scale * acceleration / config.filter.sigma_a_m_s2,
                read->jump_m,
-               read->jump_s};
+               read->jump_s,
+               read->other_log_scale};
+    if (!result.has_target) {  // nothing says which
+      scale.sigma_rel = read ? std::hypot(read->sigma_rel, 0.5 * read->other_log_scale) : 0.0;
+      scale.other_log_scale = 0.0;
+    }
     scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {
       return !result.path.empty() && reading.t_s >= result.path.front().t_s && reading.t_s <= result.path.back().t_s;
     });
@@ -322,6 +327,35 @@ void add_imu_scale(const LocalizeConfig& config, Localization& result) {
   const bool is_used = imu.fault == ImuFault::none;
   result.sensor_scales.push_back({"IMU", is_used ? imu.scale : 1.0, is_used ? imu.sigma_scale : 0.0, imu.num_steps,
                                   imu.num_rejected, imu.fault != ImuFault::other_time});
+}
+
+double sigma_target_scale(std::span<const MapPoint> map) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double num = 0.0, information = 0.0;
+  for (const MapPoint& point : map)
+    if (point.is_known) middle += point.point_in_world, num += 1.0;
+  middle /= std::max(num, 1.0);
+  for (const MapPoint& point : map)
+    if (point.is_known && point.cov.trace() > 0.0)
+      information += 3.0 * (point.point_in_world - middle).squaredNorm() / point.cov.trace();
+  return information > 0.0 ? 1.0 / std::sqrt(information) : 0.0;
+}
+
+ScaleDifference difference_from_target(const SensorScale& sensor, double sigma_target_scale) {
+  const double one = std::log(sensor.scale), other = one + sensor.other_log_scale;
+  const double of_target = sensor.sensor == "IMU" ? 0.0 : sigma_target_scale;  // an IMU's has it
+  return {std::abs(other) < std::abs(one) ? other : one, std::hypot(sensor.sigma_rel, of_target)};
+}
+
+void widen_by_contradictions(double sigma_scale, Localization& result) {
+  result.sigma_target_scale = std::hypot(sigma_target_scale(result.map), sigma_scale);
+  double most = 0.0;
+  for (const SensorScale& sensor : result.sensor_scales) {
+    if (!(sensor.sigma_rel > 0.0)) continue;
+    const ScaleDifference difference = difference_from_target(sensor, result.sigma_target_scale);
+    if (difference.sigmas() > contradicts_from) most = std::max(most, std::abs(difference.log_ratio));
+  }
+  if (most > 0.0) apply_scale({.sigma_rel = most}, result);
 }
 
 std::optional<ReadScale> scale_of(const Localization& result) {

@@ -130,6 +130,12 @@ double sigma_by_squares(const BundleSolution& solution) {
   return solution.rms_px * std::sqrt(count / std::max(solution.dof, 1));
 }
 
+/// Wrong pixels keep a solution from converging that the others have reached: it is good enough to reject them by.
+bool most_fit(const BundleSolution& solution, double sigma_px) {
+  constexpr double ordinary = 2.0;
+  return robust_sigma(solution.residual_px, solution.dof) < ordinary * sigma_px;
+}
+
 /// From the solution so far: without what does not belong, then with the noise that the rest shows.
 void solve_again(const AdjustConfig& config, const Progress& progress, RotationBundleConfig& solve,
                  Adjustment& adjustment) {
@@ -176,7 +182,8 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
     BundleSolution solution =
         solve_rotation_bundle(bundle, config.prior ? config.prior->about(start) : CommonPrior(start), solve, progress);
     const bool is_better = !adjustment.has_value || solution.sum_squares < adjustment.solution.sum_squares;
-    if (!solution.converged || !std::isfinite(solution.rms_px) || !is_better) return;
+    if (!std::isfinite(solution.rms_px) || !is_better) return;
+    if (!solution.converged && !most_fit(solution, solve.sigma_px)) return;
     adjustment.solution = std::move(solution);
     adjustment.has_value = true;
   };

@@ -79,13 +79,13 @@ async function halvesDoNotContradictTheHeader({open, url, calibration}) {
   assert.match(words, /They do not: halves differ by 4\.8σ in fy/);
 }
 
-/** A rate is no time: what ends in _rad_s stood there in seconds. */
+/** A rate is no time: what ends in _rad_s or _rad_per_s stood there in seconds. */
 async function unitsAreThoseOfTheNames({open, url, documents}) {
   const document = structuredClone(documents.servo.document);
-  Object.assign(document, {command: 'localize', data: {}, estimate: {imu: {gyro_bias_rad_s: [0.01, 0, 0], accelerometer_bias_m_s2: [0.5, 0, 0]}, ate_m: 0.25}});
+  Object.assign(document, {command: 'localize', data: {}, estimate: {imu: {gyro_bias_rad_s: [0.01, 0, 0], accelerometer_bias_m_s2: [0.5, 0, 0]}, rotation: {sigma_rate_rad_per_s: 0.02}, ate_m: 0.25}});
   const {page, close} = await open(url(document)), words = (await page.locator('#fig-estimate').innerText()).replace(/\s+/g, ' ');
   await close();
-  for (const wanted of [/gyro bias x 0\.573\d* °\/s/, /accelerometer bias x 0\.5\d* m\/s²/, /ATE 250 mm/]) assert.match(words, wanted);
+  for (const wanted of [/gyro bias x 0\.573\d* °\/s/, /accelerometer bias x 0\.5\d* m\/s²/, /rotation sigma rate 1\.1\d* °\/s/, /ATE 250 mm/]) assert.match(words, wanted);
 }
 
 async function aRefusalShowsCornersAsFound({open, url, calibration}) {

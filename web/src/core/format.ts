@@ -84,4 +84,4 @@ export function counted(count: number, word: string): string {
 export const degrees = 180 / Math.PI;
 
 /** Units as names end in them, as pages show them, and the factor between; the longer endings first. */
-export const units: [string, string, number][] = [['_rad_s2', '°/s²', degrees], ['_rad_s', '°/s', degrees], ['_m_s2', 'm/s²', 1], ['_m_s', 'm/s', 1], ['_px', 'px', 1], ['_rad', '°', degrees], ['_deg', '°', 1], ['_s', 's', 1], ['_m', 'm', 1]];
+export const units: [string, string, number][] = [['_rad_per_s', '°/s', degrees], ['_m_per_s', 'm/s', 1], ['_per_s', '1/s', 1], ['_rad_s2', '°/s²', degrees], ['_rad_s', '°/s', degrees], ['_m_s2', 'm/s²', 1], ['_m_s', 'm/s', 1], ['_px', 'px', 1], ['_rad', '°', degrees], ['_deg', '°', 1], ['_s', 's', 1], ['_m', 'm', 1]];

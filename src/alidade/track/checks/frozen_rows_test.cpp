@@ -94,20 +94,10 @@ TEST(FrozenRows, AreNamedWithTheirTime) {
     }
 }
 
-TrackScene side_by_side() {
-  TrackScene scene = *track_scenario("C");
-  scene.heads.push_back(scene.heads[1]);
-  scene.heads[2].head.id = 3;
-  scene.heads[2].head.world_from_base.translation += Eigen::Vector3d(0.5, 0.0, 0.0);
-  scene.rate_hz = {20.0, 20.0, 20.0};
-  scene.phase_s = {0.0, 0.013, 0.029};
-  return scene;
-}
-
 /// Such tracks of two heads were up to 47σ off where they were followed, of three 23σ, and named a focal length or a
 /// clock.
 TEST(FrozenRows, AreKeptOut) {
-  const TrackScene scene = side_by_side();
+  const TrackScene scene = testing::three_heads();
   for (const What what : {What::pixels, What::angles, What::all})
     for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(testing::trials(3)); ++seed) {
       std::vector<TargetObservation> observations = sorted_sample(scene, seed);

@@ -12,16 +12,6 @@
 namespace alidade {
 namespace {
 
-TrackScene of_three_heads() {
-  TrackScene scene = *track_scenario("C");
-  scene.heads.push_back(scene.heads[1]);
-  scene.heads[2].head.id = 3;
-  scene.heads[2].head.world_from_base.translation += Eigen::Vector3d(0.5, 0.0, 0.0);
-  scene.rate_hz = {20.0, 20.0, 20.0};
-  scene.phase_s = {0.0, 0.013, 0.029};
-  return scene;
-}
-
 /// From 4 to 6 s head 2 sees an object that goes its own way, where its camera would see it.
 void see_another(const TrackScene& scene, std::vector<TargetObservation>& observations, std::size_t head) {
   for (TargetObservation& observation : observations) {
@@ -36,7 +26,7 @@ void see_another(const TrackScene& scene, std::vector<TargetObservation>& observ
 
 /// It was said that a centre, a scale or a base is off, and to calibrate the head again.
 TEST(OtherObject, IsNamedWithItsRows) {
-  const TrackScene scene = of_three_heads();
+  const TrackScene scene = testing::three_heads();
   for (int seed = 1; seed <= testing::trials(3); ++seed) {
     std::vector<TargetObservation> observations = testing::observations_of(scene, static_cast<std::uint64_t>(seed));
     see_another(scene, observations, 1);
@@ -55,7 +45,7 @@ TEST(OtherObject, IsNamedWithItsRows) {
 
 /// Rows that repeat are named as such, and not what else would explain them.
 TEST(OtherObject, IsNotNamedBesideRowsThatRepeat) {
-  const TrackScene scene = of_three_heads();
+  const TrackScene scene = testing::three_heads();
   for (const double from_s : {2.0, 3.0, 4.0, 5.0, 6.0, 7.0}) {
     std::vector<TargetObservation> observations = testing::observations_of(scene, 1);
     const TargetObservation* last = nullptr;

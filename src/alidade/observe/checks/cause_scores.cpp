@@ -9,6 +9,7 @@
 #include "alidade/observe/checks/cause_columns.h"
 #include "alidade/observe/checks/eliminated_rotations.h"
 #include "alidade/observe/checks/stated_covariance.h"
+#include "alidade/observe/solve/gram_sum.h"
 
 namespace alidade {
 namespace {
@@ -176,18 +177,21 @@ class Linearisation {
     const auto& frames = reference_.bundle.frames;
     const double block_s = (frames.back().t_s - frames.front().t_s) / num_blocks;
     seen_ = seen_within(block_s, lasting_errors(reference_).seconds);
+    GramSum gram;
     visit([&](std::size_t i, const BundleObservation& seen, const MatrixXd& by_causes) {
       const MatrixXd J = followed(seen, by_causes);
       Block& block = block_of(seen.frame);
       const double weight = residual_weight(reference_, i);
-      const VectorXd pull = weight * J.transpose() * (prediction_.px - seen.px);
+      const Eigen::Matrix<double, Eigen::Dynamic, 2> weighted = weight * J.transpose();
+      const VectorXd pull = weighted * (prediction_.px - seen.px);
       block.gradient += pull;
-      block.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), weight);
+      gram.add(J, weight, block.information);
       if (by_track_.empty()) return;
       Block& track = by_track_[static_cast<std::size_t>(seen.point)];
       track.gradient.head(n_) += pull.head(n_);
-      track.information.topRows(n_).noalias() += weight * J.leftCols(n_).transpose() * J;
+      track.information.topRows(n_).noalias() += weighted.topRows(n_).lazyProduct(J.topRows<2>());
     });
+    gram.flush();
     for (int k = 0; rotations_ && k < static_cast<int>(frames.size()); ++k)
       rotations_->add_prior(k, block_of(k).gradient, block_of(k).information);
     all_ = {VectorXd::Zero(size), MatrixXd::Zero(size, size)};

@@ -6,6 +6,7 @@
 
 #include "alidade/geometry/so3.h"
 #include "alidade/observe/solve/bundle_normal.h"
+#include "alidade/observe/solve/gram_sum.h"
 
 namespace alidade {
 namespace {
@@ -169,6 +170,8 @@ class Solver {
       if (seen.frame != frame) view.emplace(state_.camera, frame_at(state_, frame = seen.frame));
       add_observation(*view, seen);
     }
+    gram_.flush();
+    normal_.common.triangularView<Eigen::StrictlyUpper>() = normal_.common.transpose();
     for (const BundleRange& range : bundle_.ranges) add_range(range);
   }
 
@@ -217,8 +220,8 @@ class Solver {
     const PixelByCommon by_common = p.J_px_common.leftCols(layout_.size);
     if (!config_.with_depth) p.J_px_point.col(2).setZero();
     NormalBlock& block = normal_.points[static_cast<std::size_t>(seen.point)];
-    normal_.common.noalias() += weight * by_common.transpose() * by_common;
-    normal_.gradient.noalias() += weight * by_common.transpose() * error;
+    gram_.add(by_common, weight, normal_.common);
+    normal_.gradient.noalias() += by_common.transpose() * (weight * error);
     block.information.noalias() += weight * p.J_px_point.transpose() * p.J_px_point;
     block.gradient.noalias() += weight * p.J_px_point.transpose() * error;
     block.by_common.noalias() += weight * p.J_px_point.transpose() * by_common;
@@ -327,6 +330,7 @@ class Solver {
   std::vector<Eigen::Vector2d> residuals_;
   double sum_squares_ = 0.0;
   RotationPrediction prediction_;
+  GramSum gram_;
 
   static ObserveNuisances with_turn(ObserveNuisances nuisances) {
     nuisances.rotation = true;

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+namespace alidade {
+
+/// Σ w Jᵀ J of many J, 2 × n, in batches: the product of two rows alone is mostly overhead.
+class GramSum {
+ public:
+  /// Adds w Jᵀ J to the sum, whose lower triangle alone is written, now or at flush().
+  template <typename Rows>
+  void add(const Eigen::MatrixBase<Rows>& J, double weight, Eigen::MatrixXd& sum) {
+    if (used_ > 0 && (&sum != sum_ || used_ == batch)) flush();
+    sum_ = &sum;
+    columns_.resize(J.cols(), batch);
+    columns_.template middleCols<2>(used_) = std::sqrt(weight) * J.transpose();
+    used_ += 2;
+  }
+
+  void flush() {
+    if (used_ > 0) sum_->selfadjointView<Eigen::Lower>().rankUpdate(columns_.leftCols(used_));
+    used_ = 0;
+  }
+
+ private:
+  static constexpr Eigen::Index batch = 64;
+  Eigen::MatrixXd columns_;  ///< Of J, transposed, each by the root of its weight.
+  Eigen::Index used_ = 0;
+  Eigen::MatrixXd* sum_ = nullptr;
+};
+
+}  // namespace alidade

@@ -61,7 +61,8 @@ void follow_record(const std::string& file, TrackScene& scene) {
 
 const char* const fault_help =
     "What is not as rig.yaml says, NAME or NAME:SIZE; of head 2 unless named: yaw, pitch, roll (of its base, rad), "
-    "baseline (share of it), pan_zero1, pan_zero2, tilt_zero1, tilt_zero2 (rad), clock (s), clutter (share of the "
+    "baseline (share of it), pan_zero1, pan_zero2, tilt_zero1, tilt_zero2 (rad), clock (s), time_step (of all heads' "
+    "times, rounded down, s), clutter (share of the "
     "observations), second_target (share of the observations), swapped, mirrored, pan_sign, tilt_sign; rig.yaml then "
     "does not call "
     "itself exact";
@@ -94,6 +95,7 @@ void add_fault(const std::string& text, TrackFaults& faults) {
                                                                 {"tilt_zero1", {&faults.zero_rad[0].y(), 1.0}},
                                                                 {"tilt_zero2", {&faults.zero_rad[1].y(), 1.0}},
                                                                 {"clock", {&faults.clock_s, 1.0}},
+                                                                {"time_step", {&faults.time_step_s, 1.0}},
                                                                 {"clutter", {&faults.clutter, 1.0}},
                                                                 {"second_target", {&faults.second, 1.0}}};
   const auto found = sizes.find(name);
@@ -101,8 +103,8 @@ void add_fault(const std::string& text, TrackFaults& faults) {
   const auto size = number_of(number);
   if (found == sizes.end() || !size || !(std::abs(*size) <= found->second.second))
     throw UsageError(fmt::format("--fault: '{}' is not NAME or NAME:SIZE, size at most 1; see --help", text));
-  if ((name == "clutter" || name == "second_target") && *size < 0.0)
-    throw UsageError(fmt::format("--fault: '{}' is a share below 0", text));
+  if ((name == "clutter" || name == "second_target" || name == "time_step") && *size < 0.0)
+    throw UsageError(fmt::format("--fault: '{}' is below 0", text));
   *found->second.first = *size;
 }
 

@@ -99,10 +99,17 @@ std::vector<RigHead> heads_as_they_are(const TrackScene& scene) {
   return heads;
 }
 
+double rounded_down(double t_s, double step_s) { return step_s * std::floor(t_s / step_s + 1e-9); }
+
 /// How the log distorts an observation: false names, signs and positions.
 void spoil(const TrackScene& scene, Draws& draws, SimulatedObservation& observation) {
   const TrackFaults& faults = scene.faults;
   const Camera& camera = scene.heads[observation.head].camera;
+  if (faults.time_step_s > 0.0) {
+    const double early_s = observation.t_capture_s - rounded_down(observation.t_capture_s, faults.time_step_s);
+    observation.t_capture_s -= early_s;
+    observation.t_arrival_s -= early_s;
+  }
   if (faults.clutter > 0.0) {
     const Vector2d elsewhere(draws.uniform(0.0, camera.width_px - 1.0), draws.uniform(0.0, camera.height_px - 1.0));
     if (draws.uniform(0.0, 1.0) < faults.clutter) observation.px = elsewhere;
@@ -135,6 +142,8 @@ void add_observations(const TrackScene& given, std::size_t head, std::uint64_t s
     if (!seen || is_hidden(scene, head, t_s)) continue;
     const Vector2d px = seen->px + noise_px;
     if (!is_in_image(scene.heads[head].camera, px)) continue;
+    const double step_s = scene.faults.time_step_s, before_s = t_s - 1.0 / scene.rate_hz[head];
+    if (step_s > 0.0 && k > 0 && rounded_down(before_s, step_s) == rounded_down(t_s, step_s)) continue;
     observations.push_back({t_s, t_s + late_s, head, angles + noise_rad, px});
     spoil(given, others, observations.back());
   }

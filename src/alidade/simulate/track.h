@@ -27,7 +27,9 @@ struct TrackFaults {
   double baseline = 0.0;                                    ///< It stands further away by this share.
   std::array<Eigen::Vector2d, 2> zero_rad{Eigen::Vector2d::Zero(),
                                           Eigen::Vector2d::Zero()};  ///< (pan, tilt), one per head.
-  double clock_s = 0.0;   ///< Its images say that they were taken so much later than they were.
+  double clock_s = 0.0;  ///< Its images say that they were taken so much later than they were.
+  double time_step_s =
+      0.0;  ///< Above 0: times of all heads are rounded down to it; of images of one time the first is left.
   double clutter = 0.0;   ///< Share of the observations, of both heads, that are anywhere in the image instead.
   double second = 0.0;    ///< Share of the observations that are of another target, 0.4 m to the right and 0.1 m above.
   bool swapped = false;   ///< The heads' names.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 
@@ -68,6 +69,19 @@ TEST(SimulateTrack, OcclusionLatencyAndRates) {
   for (const SimulatedObservation& observation : simulate_track(*track_scenario("G"), 1)) second += observation.head;
   EXPECT_GT(second, 310u);
   EXPECT_FALSE(track_scenario("H"));
+}
+
+TEST(SimulateTrack, TimesRoundedDownAreOfOneImageEach) {
+  TrackScene scene = *track_scenario("G");  // 20 and 30 images a second
+  scene.faults.time_step_s = 0.04;
+  std::array<double, 2> before_s{-1.0, -1.0};
+  for (const SimulatedObservation& observation : simulate_track(scene, 1)) {
+    const double steps = observation.t_capture_s / 0.04;
+    EXPECT_NEAR(steps, std::round(steps), 1e-9);
+    EXPECT_NEAR(observation.t_arrival_s, observation.t_capture_s, 1e-12);
+    EXPECT_GT(observation.t_capture_s, before_s.at(observation.head) + 0.03);
+    before_s.at(observation.head) = observation.t_capture_s;
+  }
 }
 
 }  // namespace

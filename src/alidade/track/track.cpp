@@ -9,6 +9,7 @@
 #include "alidade/track/checks/frozen_rows.h"
 #include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/checks/time_jitter.h"
+#include "alidade/track/checks/time_steps.h"
 #include "alidade/track/xiahou_tracker.h"
 
 namespace alidade {
@@ -259,6 +260,8 @@ TrackReport track_target(std::span<const TargetObservation> observations, std::s
     judge_observations(others, heads, used, report);
     inflate(report);
     heed_faults(observations, heads, used, report);
+    report.rounded = rounded_times(others, used, report);
+    if (report.rounded) count_rounding(report.rounded->step_s, report);
   } else {
     report.nis_per_dof = mean_nis(report.steps, counts, config.tracker.gate);
   }

@@ -63,6 +63,13 @@ struct TimeJitter {
   double gain = 0.0;     ///< Of ln p, over innovations that are larger by one factor, whatever the motion.
 };
 
+/// Capture times that are whole steps apart, where images were taken between: by the intervals of a head.
+struct RoundedTimes {
+  double step_s = 0.0;
+  double late_m = 0.0;         ///< The target moves so far in half a step; median over the track.
+  double late_in_sigma = 0.0;  ///< In σ of its position without this.
+};
+
 /// Rows of a head that repeat the one before them exactly, and are kept out.
 struct FrozenRows {
   std::size_t head = 0;                            ///< Index in the rig's list of heads.
@@ -96,12 +103,14 @@ struct TrackReport {
   /// coloured by what does not change. One per head.
   std::vector<HeadInnovations> innovations;
   std::optional<TimeJitter> jitter;  ///< Where the innovations ask for it.
-  double inflation = 1.0;            ///< Every covariance was increased by this factor, from the innovations.
-  std::vector<RigFault> faults;      ///< The most significant first.
-  std::vector<RigPower> power;       ///< Of each parameter that is tested.
-  bool fits_without_fault = false;   ///< The first is significant, and with it corrected the observations fit.
-  bool errors_are_counted = false;   ///< Those of the rig.
-  std::vector<FrozenRows> frozen;    ///< Kept out, in order of heads and times.
+  /// Where the times show it and no σ of clocks is given: every covariance has half a step of the target's motion.
+  std::optional<RoundedTimes> rounded;
+  double inflation = 1.0;           ///< Every covariance was increased by this factor, from the innovations.
+  std::vector<RigFault> faults;     ///< The most significant first.
+  std::vector<RigPower> power;      ///< Of each parameter that is tested.
+  bool fits_without_fault = false;  ///< The first is significant, and with it corrected the observations fit.
+  bool errors_are_counted = false;  ///< Those of the rig.
+  std::vector<FrozenRows> frozen;   ///< Kept out, in order of heads and times.
 };
 
 /// Called with each observation and what became of it. What it throws ends the work.

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <map>
 #include <vector>
 
 #include "alidade/estimation/median.h"
@@ -37,12 +40,95 @@ double exact_step(std::span<const double> times, double about_s) {
 
 std::string in_ms(double seconds) { return text_of(1e3 * seconds, 3) + " ms"; }
 
+/// What a step does to the target's position, medians over the track: how far it goes, and in σ.
+StepMove move_of(double step_s, const TrackReport& report) {
+  StepMove move{.step_s = step_s};
+  std::vector<double> moved, in_sigma;
+  for (std::size_t i = report.steps.size() / 10; i < report.steps.size(); ++i) {
+    const TrackStep& step = report.steps[i];
+    if (!step.has_belief || !step.accepted) continue;
+    const Eigen::Vector3d by = step_s * step.belief.x.segment<3>(3);
+    moved.push_back(by.norm());
+    in_sigma.push_back((by.array().abs() / step.belief.P.diagonal().head<3>().array().sqrt()).maxCoeff());
+  }
+  move.moved_m = median_of(moved);
+  move.moved_in_sigma = median_of(in_sigma);
+  return move;
+}
+
+long most_frequent(std::span<const long> intervals) {
+  std::map<long, std::size_t> num;
+  for (const long interval : intervals) ++num[interval];
+  return std::ranges::max_element(num, {}, [](const auto& one) { return one.second; })->first;
+}
+
+/// Intervals about as long as the usual one, and neither it nor its gaps, come again and again. Where images are gone
+/// from one at every step, one step is the usual; where most of them are, intervals are of any length.
+bool are_irregular(std::span<const long> intervals, long usual) {
+  const auto num = std::ssize(intervals);
+  const long middle = median_of(std::vector<long>(intervals.begin(), intervals.end()));
+  const auto about = std::ranges::count_if(intervals, [&](long n) { return 2 * std::abs(n - middle) <= middle; });
+  const auto single = std::ranges::count(intervals, 1L), most = std::ranges::count(intervals, usual);
+  if (2 * single > most || 4 * about < 3 * num) return false;
+  std::ptrdiff_t odd = 0;
+  for (std::size_t k = 1; k < intervals.size(); ++k)
+    odd += intervals[k] % usual != 0 && intervals[k] != intervals[k - 1] ? 1 : 0;
+  return odd >= 8 && 10 * odd >= num;
+}
+
+/// The longest stretch of intervals of `shorter` or one more.
+std::span<const long> longest_stretch(std::span<const long> intervals, long shorter) {
+  std::span<const long> longest;
+  for (std::size_t begin = 0, end = 0; begin < intervals.size(); begin = end + 1) {
+    for (end = begin; end < intervals.size() && (intervals[end] == shorter || intervals[end] == shorter + 1);) ++end;
+    if (end - begin > longest.size()) longest = intervals.subspan(begin, end - begin);
+  }
+  return longest;
+}
+
+/// Images at a constant rate between the steps have such intervals: with their sums as times, one line by their number
+/// is nowhere more than a step off, and a little for the camera's own jitter.
+bool are_of_one_rate(std::span<const long> intervals) {
+  constexpr double within = 1.2;
+  double low = 0.0, high = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    double moved = 0.0, num = 0.0;
+    for (std::size_t j = i; j < intervals.size(); ++j) {
+      moved += static_cast<double>(intervals[j]);
+      num += 1.0;
+      low = std::max(low, (moved - within) / num);
+      high = std::min(high, (moved + within) / num);
+    }
+  }
+  return low < high;
+}
+
 }  // namespace
+
+bool are_between_steps(std::span<const double> times_s, double step_s) {
+  constexpr std::ptrdiff_t min_intervals = 16, min_stretch = 24, max_stretch = 300;
+  std::vector<long> intervals;
+  for (std::size_t k = 1; k < times_s.size(); ++k)
+    intervals.push_back(std::lround((times_s[k] - times_s[k - 1]) / step_s));
+  if (std::ssize(intervals) < min_intervals) return false;
+  const long usual = most_frequent(intervals);
+  if (usual > 1 && are_irregular(intervals, usual)) return true;
+  for (const long shorter : {usual - 1, usual}) {
+    if (shorter < 1) continue;
+    std::span<const long> stretch = longest_stretch(intervals, shorter);
+    stretch = stretch.first(static_cast<std::size_t>(std::min(std::ssize(stretch), max_stretch)));
+    // One step and two may be gaps: that those lie as evenly as that takes more of them.
+    const std::ptrdiff_t least = shorter > 1 ? 4 : 8, num = std::ranges::count(stretch, shorter);
+    const bool has_both = std::min(num, std::ssize(stretch) - num) >= least;
+    if (std::ssize(stretch) >= min_stretch && has_both && are_of_one_rate(stretch)) return true;
+  }
+  return false;
+}
 
 double step_of_times(std::span<const TargetObservation> observations) {
   constexpr std::size_t min_times = 16;
   constexpr double least_s = 1e-4;
-  constexpr int max_parts = 10;
+  constexpr int max_parts = 50;
   const std::vector<double> times = times_of(observations);
   if (times.size() < min_times) return 0.0;
   double closest_s = times.back() - times.front();
@@ -54,20 +140,50 @@ double step_of_times(std::span<const TargetObservation> observations) {
 
 std::optional<StepMove> move_within_step(std::span<const TargetObservation> observations, const TrackReport& report) {
   constexpr double least_sigma = 0.5;
-  StepMove move{.step_s = step_of_times(observations)};
-  if (!(move.step_s > 0.0)) return std::nullopt;
-  std::vector<double> moved, in_sigma;
-  for (std::size_t i = report.steps.size() / 10; i < report.steps.size(); ++i) {
-    const TrackStep& step = report.steps[i];
-    if (!step.has_belief || !step.accepted) continue;
-    const Eigen::Vector3d by = move.step_s * step.belief.x.segment<3>(3);
-    moved.push_back(by.norm());
-    in_sigma.push_back((by.array().abs() / step.belief.P.diagonal().head<3>().array().sqrt()).maxCoeff());
+  const double step_s = step_of_times(observations);
+  if (!(step_s > 0.0)) return std::nullopt;
+  const StepMove move = move_of(step_s, report);
+  return move.moved_in_sigma > least_sigma ? std::optional(move) : std::nullopt;
+}
+
+std::optional<RoundedTimes> rounded_times(std::span<const TargetObservation> observations, const FollowConfig& config,
+                                          const TrackReport& report) {
+  std::map<std::size_t, std::vector<TargetObservation>> of_head;
+  for (const TargetObservation& observation : observations) of_head[observation.head].push_back(observation);
+  double step_s = 0.0, counted_s = 0.0;
+  for (const auto& [head, some] : of_head) {
+    const double own_s = step_of_times(some);
+    if (own_s > step_s && are_between_steps(times_of(some), own_s)) step_s = own_s;
   }
-  move.moved_m = median_of(moved);
-  move.moved_in_sigma = median_of(in_sigma);
-  if (!(move.moved_in_sigma > least_sigma)) return std::nullopt;
-  return move;
+  for (const Eigen::MatrixXd& factor : config.tracker.errors.factor)
+    if (factor.rows() > 0) counted_s = std::max(counted_s, factor.row(factor.rows() - 1).norm());
+  if (!(step_s > std::sqrt(12.0) * counted_s)) return std::nullopt;
+  const StepMove move = move_of(0.5 * step_s, report);
+  return RoundedTimes{.step_s = step_s, .late_m = move.moved_m, .late_in_sigma = move.moved_in_sigma};
+}
+
+Check rounded_check(const RoundedTimes& rounded) {
+  constexpr double max_sigma = 1.0;
+  return {.name = "times",
+          .state = rounded.late_in_sigma > max_sigma ? State::care : State::good,
+          .text = "all times are whole steps of " + in_ms(rounded.step_s) +
+                  " apart, and images were taken between: if their times were rounded down, they are " +
+                  in_ms(0.5 * rounded.step_s) + " early, and the target " + text_of(1e3 * rounded.late_m, 2) +
+                  " mm off (" + text_of(rounded.late_in_sigma, 2) + "σ); σ includes that",
+          .value = rounded.late_in_sigma,
+          .limit = max_sigma,
+          .unit = "σ",
+          .figure = "track"};
+}
+
+void count_rounding(double step_s, TrackReport& report) {
+  const auto widen = [step_s](Belief<6>& belief) {
+    const Eigen::Vector3d moved = 0.5 * step_s * belief.x.segment<3>(3);
+    belief.P.topLeftCorner<3, 3>() += moved * moved.transpose();
+  };
+  for (TrackStep& step : report.steps) widen(step.belief);
+  for (PredictedStep& step : report.ahead) widen(step.belief);
+  for (PredictedStep& step : report.smoothed) widen(step.belief);
 }
 
 std::string step_text(const StepMove& move) {

@@ -15,6 +15,10 @@ struct ClockShift;
 /// the times themselves do not tell which.
 [[nodiscard]] double step_of_times(std::span<const TargetObservation> observations);
 
+/// Whether times of images, whole steps apart, are of images that were taken between the steps: their intervals
+/// alternate between numbers of steps as those of no camera that takes one every so many steps, with or without gaps.
+[[nodiscard]] bool are_between_steps(std::span<const double> times_s, double step_s);
+
 /// What times that were rounded to that step do to the target: how far it goes within a step, and in σ of its position;
 /// medians over the track.
 struct StepMove {
@@ -24,6 +28,16 @@ struct StepMove {
 /// None where all times have no step, or where it moves the target by less than half of σ.
 [[nodiscard]] std::optional<StepMove> move_within_step(std::span<const TargetObservation> observations,
                                                        const TrackReport& report);
+
+/// None where the times of no head show that they were rounded, or --sigma-clock counts it.
+[[nodiscard]] std::optional<RoundedTimes> rounded_times(std::span<const TargetObservation> observations,
+                                                        const FollowConfig& config, const TrackReport& report);
+
+/// The check of it, "times": of care where half a step moves the target by more than σ.
+[[nodiscard]] Check rounded_check(const RoundedTimes& rounded);
+
+/// Every covariance raised by what half a step moves the target.
+void count_rounding(double step_s, TrackReport& report);
 
 /// "all t_capture_s are whole steps of 50 ms apart: …, which no observations show".
 [[nodiscard]] std::string step_text(const StepMove& move);

@@ -38,6 +38,39 @@ TEST(TimeSteps, AreTheLargestThatAllTimesAreApart) {
   EXPECT_EQ(step_of_times(at_times({0.0, 0.05, 0.1})), 0.0);
 }
 
+/// Times rounded down to one, in steps.
+std::vector<double> rounded_down(const std::vector<double>& times_in_steps) {
+  std::vector<double> rounded;
+  for (const double time : times_in_steps)
+    if (rounded.empty() || std::floor(time) > rounded.back()) rounded.push_back(std::floor(time));
+  return rounded;
+}
+
+/// Images every `interval` steps, each off by so much, of which a share is not there.
+std::vector<double> images(double interval, double jitter = 0.0, double gone = 0.0) {
+  Draws draws(7);
+  std::vector<double> times;
+  for (int k = 0; k < 300; ++k) {
+    const double time = 0.3 + interval * k + jitter * draws.normal();
+    if (draws.uniform(0.0, 1.0) >= gone) times.push_back(time);
+  }
+  return times;
+}
+
+TEST(TimeSteps, ThatImagesLieBetweenAreToldFromGaps) {
+  for (const double interval : {3.3367, 4.1667, 1.6683, 1.43, 1.25, 1.05, 10.0 / 7.0, 4.016})  // 29.97 Hz, 10 ms; …
+    EXPECT_TRUE(are_between_steps(rounded_down(images(interval)), 1.0)) << interval;
+  EXPECT_TRUE(are_between_steps(rounded_down(images(3.3367, 0.0, 0.2)), 1.0));
+  EXPECT_TRUE(are_between_steps(rounded_down(images(2.5, 0.4)), 1.0));
+  for (const double interval : {1.0, 2.0, 5.0})
+    for (const double gone : {0.0, 0.02, 0.1, 0.3, 0.6, 0.8, 0.9})
+      EXPECT_FALSE(are_between_steps(rounded_down(images(interval, 0.0, gone)), 1.0)) << interval << " " << gone;
+  std::vector<double> slower = rounded_down(images(4.0));  // 25 images a second, then 20
+  for (int k = 0; k < 300; ++k) slower.push_back(slower.back() + 5.0);
+  EXPECT_FALSE(are_between_steps(slower, 1.0));
+  EXPECT_FALSE(are_between_steps(rounded_down({0.0, 1.5, 3.0, 4.5}), 1.0));
+}
+
 /// Scenario C by heads that take 20 images a second at phases of their own, whose times are rounded down.
 struct Rounded {
   TrackScene scene = *track_scenario("C");
@@ -45,8 +78,13 @@ struct Rounded {
   TrackReport report;
   FollowConfig config;
 
-  Rounded(double phase_1_s, double phase_2_s, double step_s, std::uint64_t seed) {
-    scene.rate_hz = {20.0, 20.0};
+  Rounded(double phase_1_s, double phase_2_s, double step_s, std::uint64_t seed, double rate_hz = 20.0,
+          double sigma_encoder_rad = 0.0) {
+    scene.rate_hz = {rate_hz, rate_hz};
+    if (sigma_encoder_rad > 0.0) {
+      scene.sigma_encoder_rad = sigma_encoder_rad;
+      for (RigHead& head : scene.heads) head.head.encoder.sigma_rad = sigma_encoder_rad;
+    }
     scene.phase_s = {phase_1_s, phase_2_s};
     observations = testing::observations_of(scene, seed);
     for (TargetObservation& observation : observations) {
@@ -55,13 +93,15 @@ struct Rounded {
     }
     report = track_target(observations, scene.heads, config);
   }
-  [[nodiscard]] double worst_sigma() const {
+  /// By what σ would be without so much of the target's motion.
+  [[nodiscard]] double worst_sigma(double counted_s = 0.0) const {
     double worst = 0.0;
     for (const TrackStep& step : report.steps)
       if (step.has_belief && step.t_s > 1.5)
-        for (int k = 0; k < 3; ++k)
-          worst = std::max(worst,
-                           std::abs(step.belief.x[k] - scene.position(step.t_s)[k]) / std::sqrt(step.belief.P(k, k)));
+        for (int k = 0; k < 3; ++k) {
+          const double variance = step.belief.P(k, k) - std::pow(counted_s * step.belief.x[3 + k], 2);
+          worst = std::max(worst, std::abs(step.belief.x[k] - scene.position(step.t_s)[k]) / std::sqrt(variance));
+        }
     return worst;
   }
   [[nodiscard]] const Assumption* row(std::vector<Assumption>& assumed, double sigma_clock_s) const {
@@ -97,6 +137,21 @@ TEST(TimeSteps, OfAllHeadsAreSaidToBeNotTested) {
   const Rounded exact(0.0437, 0.0321371, 0.0, 3);
   std::vector<Assumption> none;
   EXPECT_EQ(exact.row(none, 0.0), nullptr);
+}
+
+/// Images at 12 Hz lie between steps of 50 ms, of both heads alike: their times are 25 ms early on average.
+TEST(TimeSteps, BetweenWhichImagesAreTakenAreNamedAndCounted) {
+  for (int seed = 1; seed <= testing::trials(2); ++seed) {
+    const Rounded rounded(0.013, 0.013, 0.05, static_cast<std::uint64_t>(seed), 12.0, 1e-4);
+    const Verdict verdict = track_verdict(rounded.report, rounded.observations, rounded.scene.heads, rounded.config);
+    ASSERT_TRUE(rounded.report.rounded.has_value()) << seed;
+    EXPECT_NEAR(rounded.report.rounded->step_s, 0.05, 1e-6) << seed;
+    EXPECT_EQ(verdict.state, State::care) << seed;
+    EXPECT_NE(verdict.sentence.find("whole steps of 50 ms apart"), std::string::npos) << verdict.sentence;
+    EXPECT_NE(verdict.to_add.find("--sigma-clock 0.029"), std::string::npos) << verdict.to_add;
+    EXPECT_LT(rounded.worst_sigma(), 4.0) << seed;
+    EXPECT_GT(rounded.worst_sigma(0.025), 5.0) << seed;
+  }
 }
 
 /// Heads whose times are not rounded by the same: the cause of their clocks' difference is named.

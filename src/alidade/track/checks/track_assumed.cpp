@@ -168,9 +168,17 @@ std::optional<Assumption> not_tested(std::span<const TargetObservation> observat
   return row;
 }
 
-/// One row for times that may have been rounded. Of true ones they differ in nothing, so that it has no say, either.
+/// One row for times that may have been rounded. Of true ones they differ in nothing, so that it has no say, either;
+/// where they differ, the answer's σ counts it.
 std::optional<Assumption> times_not_tested(std::span<const TargetObservation> observations, const TrackReport& report,
                                            double sigma_clock_s) {
+  if (report.rounded)
+    return Assumption{.name = "times.rounded",
+                      .value = report.rounded->step_s,
+                      .sigma = 0.5 * report.rounded->step_s,
+                      .ordinary = 0.5 * report.rounded->step_s,
+                      .moves = std::nan(""),
+                      .moved = rounded_check(*report.rounded).text};
   const auto move = move_within_step(observations, report);
   if (!move) return std::nullopt;
   Assumption row{

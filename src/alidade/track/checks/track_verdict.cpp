@@ -245,12 +245,21 @@ void add_other(const OtherObject& other, std::span<const RigHead> heads, Verdict
                                  other_object_text(other, heads), other.moved_in_sigma, max_sigma, "σ"));
 }
 
-void add_clocks(const Causes& causes, std::span<const RigHead> heads, Verdict& verdict) {
+void add_clocks(const TrackReport& report, const Causes& causes, std::span<const RigHead> heads, Verdict& verdict) {
   if (causes.shift)
     verdict.checks.push_back(
         check("clocks", State::care, clocks_text(causes, heads), 1e3 * causes.shift->later_s, 0.0, "ms"));
   else if (causes.step_s > 0.0)
     verdict.checks.push_back(check("times", State::care, rounding_text(causes.step_s), 1e3 * causes.step_s, 0.0, "ms"));
+  if (report.rounded && !(causes.step_s > 0.0)) verdict.checks.push_back(rounded_check(*report.rounded));
+}
+
+/// What to do about times that are not those of the images; what they scatter by is less than what they are late by.
+void set_times_remedy(const TrackReport& report, const Causes& causes, Verdict& verdict) {
+  if (causes.step_s > 0.0) verdict.to_add = rounding_remedy(causes.step_s);
+  if (report.jitter) verdict.to_add = jitter_remedy();
+  if (report.rounded && verdict.state > State::good && (verdict.to_add.empty() || report.jitter))
+    verdict.to_add = rounding_remedy(report.rounded->step_s);
 }
 
 /// Why there is no track.
@@ -348,7 +357,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   if (report.jitter)
     verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
                                    1e3 * report.jitter->sigma_s, 0.0, "ms"));
-  add_clocks(causes, heads, verdict);
+  add_clocks(report, causes, heads, verdict);
   if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
   if (causes.second) verdict.checks.push_back(*causes.second);
   if (causes.falls) verdict.checks.push_back(*causes.falls);
@@ -357,8 +366,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   put_likelier_first(verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
   if (!alike_per_head(report).empty()) verdict.to_add = fault_remedy(report, heads);
-  if (causes.step_s > 0.0) verdict.to_add = rounding_remedy(causes.step_s);
-  if (report.jitter) verdict.to_add = jitter_remedy();
+  set_times_remedy(report, causes, verdict);
   set_frozen_remedy(report, heads, verdict);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   if (causes.other) verdict.to_add = other_object_remedy(*causes.other, heads);

@@ -8,7 +8,8 @@ namespace alidade {
 /// Σ w Jᵀ J of many J, 2 × n, in batches: the product of two rows alone is mostly overhead.
 class GramSum {
  public:
-  /// Adds w Jᵀ J to the sum, whose lower triangle alone is written, now or at flush().
+  /// Adds w Jᵀ J (J 2 × n, w ≥ 0) to the sum, n × n, whose lower triangle alone is written, now or at flush(): until
+  /// then the sum must stay where it is.
   template <typename Rows>
   void add(const Eigen::MatrixBase<Rows>& J, double weight, Eigen::MatrixXd& sum) {
     if (used_ > 0 && (&sum != sum_ || used_ == batch)) flush();

@@ -36,6 +36,9 @@ foreach(executable label IN ZIP_LISTS executables labels)
         add_test(${label}.${suite} ${executable} "--gtest_filter=${suite}.*")
         set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST ${cost}
                              FAIL_REGULAR_EXPRESSION "${none_ran}")
+        if(suite STREQUAL Speed)  # measures time: alone, when the others are done
+          set_tests_properties(${label}.${suite} PROPERTIES RUN_SERIAL TRUE)
+        endif()
         list(APPEND tests_of_${label} ${label}.${suite})
       endif()
       set(suite ${next})

@@ -145,7 +145,8 @@ std::vector<Eigen::Index> places_of(const std::vector<std::string>& names, const
   for (const std::string& name : names) {
     const auto found = std::find(known.begin(), known.end(), name);
     if (found == known.end())
-      refuse(fields.file(), fields.full("names"), fmt::format("'{}' is no parameter of {}; it has {}", name, of, fmt::join(known, ", ")));
+      refuse(fields.file(), fields.full("names"),
+             fmt::format("'{}' is no parameter of {}; it has {}", name, of, fmt::join(known, ", ")));
     const Eigen::Index at = found - known.begin();
     if (std::find(places.begin(), places.end(), at) != places.end())
       refuse(fields.file(), fields.full("names"), "'" + name + "' appears twice");

@@ -46,6 +46,19 @@ AxisMotion advanced(const RatePlant& plant, const AxisMotion& motion, double com
   return next;
 }
 
+/// (1/τ) ∫ exp(−(t−s)/τ) exp(−s/λ) ds over a time t: what a lag τ makes of one that decays with λ, also of equal ones.
+double response_to_decay(double tau_s, double lag_s, double t_s) {
+  const double apart = t_s * std::abs(1.0 / tau_s - 1.0 / lag_s);
+  const double mean = apart > 0.0 ? -std::expm1(-apart) / apart : 1.0;
+  return t_s / tau_s * std::exp(-t_s / std::max(tau_s, lag_s)) * mean;
+}
+
+bool is_linear(const ServoAxis& axis) {
+  const auto* plant = std::get_if<AnglePlant>(&axis.plant);  // a rate always has limits
+  return plant != nullptr && std::isinf(plant->max_rate_rad_s) && std::isinf(plant->max_acceleration_rad_s2) &&
+         std::isinf(axis.min_rad) && std::isinf(axis.max_rad) && !(axis.backlash_rad > 0.0);
+}
+
 }  // namespace
 
 double radians_in(AngleUnit unit) { return unit == AngleUnit::deg ? degree : 1.0; }
@@ -62,6 +75,23 @@ AxisMotion advanced(const ServoAxis& axis, const AxisMotion& motion, double comm
   AxisMotion next = std::visit([&](const auto& plant) { return advanced(plant, motion, command, dt_s); }, axis.plant);
   if (next.angle_rad < axis.min_rad || next.angle_rad > axis.max_rad)
     next = {std::clamp(next.angle_rad, axis.min_rad, axis.max_rad), 0.0};
+  return next;
+}
+
+LaggedMotion advanced_behind_lag(const ServoPlant& plant, double lag_s, const LaggedMotion& from, double command,
+                                 double dt_s) {
+  const double tau_s = tau_of(plant), gain = gain_of(plant), goal = gain * command, away = from.lagged - command;
+  const double lag_rise = -std::expm1(-dt_s / lag_s), decay = std::exp(-dt_s / tau_s);
+  const double pulled = goal + gain * away * response_to_decay(tau_s, lag_s, dt_s);
+  LaggedMotion next{from.motion, command + away * (1.0 - lag_rise)};
+  if (std::holds_alternative<AnglePlant>(plant)) {
+    next.motion.angle_rad = pulled + decay * (from.motion.angle_rad - goal);
+    if (dt_s > 0.0) next.motion.rate_rad_s = (next.motion.angle_rad - from.motion.angle_rad) / dt_s;
+  } else {  // τ ω' = g u − ω, summed over the time
+    next.motion.rate_rad_s = pulled + decay * (from.motion.rate_rad_s - goal);
+    next.motion.angle_rad +=
+        goal * dt_s + gain * away * lag_s * lag_rise - tau_s * (next.motion.rate_rad_s - from.motion.rate_rad_s);
+  }
   return next;
 }
 
@@ -94,19 +124,29 @@ ServoAxis linear_part(const ServoAxis& axis) {
   return linear;
 }
 
-void DelayedAxis::move(double dt_s, double command) {
-  const double goal = past_dead_band(command, axis_.dead_band), lag_s = axis_.second_tau_s;
-  if (lag_s > 0.0 && dt_s > 0.0) {
-    constexpr double per_tau = 20.0, max_steps = 4096.0;
-    const double steps = std::clamp(std::ceil(per_tau * dt_s / std::min(lag_s, tau_of(axis_.plant))), 1.0, max_steps);
-    const double step_s = dt_s / steps, rise = -std::expm1(-step_s / lag_s);
-    for (double k = 0.0; k < steps; ++k) {
-      motion_ = advanced(axis_, motion_, goal + (lagged_ - goal) * rise * lag_s / step_s, step_s);
-      lagged_ += rise * (goal - lagged_);
-    }
-  } else {
-    motion_ = advanced(axis_, motion_, goal, dt_s);
+void DelayedAxis::move_behind_lag(double dt_s, double goal) {
+  const double lag_s = axis_.second_tau_s;
+  if (is_linear(axis_)) {
+    const LaggedMotion next = advanced_behind_lag(axis_.plant, lag_s, {motion_, lagged_}, goal, dt_s);
+    motion_ = next.motion;
+    lagged_ = next.lagged;
+    return;
   }
+  constexpr double per_tau = 20.0, max_steps = 4096.0;
+  const double steps = std::clamp(std::ceil(per_tau * dt_s / std::min(lag_s, tau_of(axis_.plant))), 1.0, max_steps);
+  const double step_s = dt_s / steps, rise = -std::expm1(-step_s / lag_s);
+  for (double k = 0.0; k < steps; ++k) {
+    motion_ = advanced(axis_, motion_, goal + (lagged_ - goal) * rise * lag_s / step_s, step_s);
+    lagged_ += rise * (goal - lagged_);
+  }
+}
+
+void DelayedAxis::move(double dt_s, double command) {
+  const double goal = past_dead_band(command, axis_.dead_band);
+  if (axis_.second_tau_s > 0.0 && dt_s > 0.0)
+    move_behind_lag(dt_s, goal);
+  else
+    motion_ = advanced(axis_, motion_, goal, dt_s);
   const double half = 0.5 * axis_.backlash_rad;
   const double angle = std::clamp(driven_.angle_rad, motion_.angle_rad - half, motion_.angle_rad + half);
   driven_ = {angle, half > 0.0 && angle == driven_.angle_rad ? 0.0 : motion_.rate_rad_s};

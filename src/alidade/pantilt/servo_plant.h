@@ -76,6 +76,15 @@ struct AxisMotion {
 /// still.
 [[nodiscard]] AxisMotion advanced(const ServoAxis& axis, const AxisMotion& motion, double command, double dt_s);
 
+/// A plant behind a first-order lag of its command, and the command behind that lag.
+struct LaggedMotion {
+  AxisMotion motion;
+  double lagged = 0.0;
+};
+/// It dt ≥ 0 later under a constant command that acts at once, without limits of rate and acceleration. Closed form.
+[[nodiscard]] LaggedMotion advanced_behind_lag(const ServoPlant& plant, double lag_s, const LaggedMotion& from,
+                                               double command, double dt_s);
+
 [[nodiscard]] double tau_of(const ServoPlant& plant);
 /// Angle (or rate) per unit of command. [rad, rad/s]
 [[nodiscard]] double gain_of(const ServoPlant& plant);
@@ -83,7 +92,7 @@ struct AxisMotion {
 [[nodiscard]] ServoPlant scaled(const ServoPlant& plant, double gain_factor, double tau_factor);
 
 /// A simulated axis with its command delay: pending commands are queued. Allocates nothing.
-/// Exact but for a second lag, which is stepped through to 10⁻⁴ of it.
+/// Exact; a second lag of an axis with limits, stops or backlash is stepped through to 10⁻⁴ of it.
 class DelayedAxis {
  public:
   DelayedAxis(const ServoAxis& axis, const AxisMotion& motion) : axis_(axis), motion_(motion), driven_(motion) {}
@@ -105,6 +114,7 @@ class DelayedAxis {
     double in_s, command;
   };
   void move(double dt_s, double command);
+  void move_behind_lag(double dt_s, double goal);
 
   ServoAxis axis_;
   AxisMotion motion_;     ///< Of what drives it.

@@ -61,6 +61,38 @@ TEST(ServoPlant, ClosedFormIsTheIntegralOfItsEquation) {
   EXPECT_GT(num_hard, 10);
 }
 
+/// Both lags in ten thousand steps of Heun's rule; equal ones among them.
+TEST(ServoPlant, BehindASecondLagIsTheIntegralOfItsEquations) {
+  for (const ServoPlant& plant :
+       {ServoPlant(AnglePlant{2.0, AngleUnit::rad, 0.1}), ServoPlant(RatePlant{2.0, AngleUnit::rad, 0.1, 1e9, 1e9})}) {
+    for (const double lag_s : {0.004, 0.06, 0.1, 0.1 + 1e-12, 0.3}) {
+      const LaggedMotion start{{0.3, std::holds_alternative<RatePlant>(plant) ? -0.4 : 0.0}, 0.7};
+      constexpr double command = -0.2, dt_s = 0.13;
+      constexpr int steps = 10000;
+      LaggedMotion numeric = start;
+      const double h = dt_s / steps;
+      const auto slope = [&](const LaggedMotion& at) {
+        return LaggedMotion{derivative(plant, at.motion, at.lagged), (command - at.lagged) / lag_s};
+      };
+      const auto moved = [](const LaggedMotion& at, const LaggedMotion& by, double step) {
+        return LaggedMotion{
+            {at.motion.angle_rad + step * by.motion.angle_rad, at.motion.rate_rad_s + step * by.motion.rate_rad_s},
+            at.lagged + step * by.lagged};
+      };
+      for (int i = 0; i < steps; ++i) {
+        const LaggedMotion a = slope(numeric), b = slope(moved(numeric, a, h));
+        numeric = moved(moved(numeric, a, 0.5 * h), b, 0.5 * h);
+      }
+      const LaggedMotion exact = advanced_behind_lag(plant, lag_s, start, command, dt_s);
+      EXPECT_NEAR(exact.motion.angle_rad, numeric.motion.angle_rad, 1e-7) << lag_s;
+      EXPECT_NEAR(exact.lagged, numeric.lagged, 1e-6) << lag_s;
+      if (std::holds_alternative<RatePlant>(plant)) {
+        EXPECT_NEAR(exact.motion.rate_rad_s, numeric.motion.rate_rad_s, 1e-6) << lag_s;
+      }
+    }
+  }
+}
+
 TEST(ServoPlant, TwoHalvesMakeAWhole) {
   for (const ServoPlant& plant : {ServoPlant(AnglePlant{}), ServoPlant(RatePlant{})}) {
     const ServoAxis axis{plant};

@@ -14,12 +14,13 @@ struct Candidate {
   double sum2 = std::numeric_limits<double>::infinity();
 };
 
-/// The fit with one more flaw, from the two sizes that explain most; of a limit of rate also from one that hardly
-/// limits: a step beyond what is reached changes nothing, and does not come back.
-Candidate freed(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
+constexpr int first_steps = 8, max_steps = 40;
+
+/// Begins the fit with one more flaw, from the two sizes that explain most; of a limit of rate also from one that
+/// hardly limits: a step beyond what is reached changes nothing, and does not come back.
+Candidate begun(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
   const bool is_linear = flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift;
   const std::size_t max_starts = is_linear ? 1 : 2;
-  constexpr int first_steps = 8, max_steps = 40;
   const std::vector<FlawScore> scores = flaw_scores(log, fit, ground, flaw);
   Candidate best{flaw, fit};
   const auto start = [&](double size) {
@@ -31,8 +32,22 @@ Candidate freed(std::span<const ServoSample> log, const ServoFit& fit, const Fla
   };
   for (std::size_t i = 0; i < std::min(max_starts, scores.size()); ++i) start(scores[i].size);
   if (flaw == ServoFlaw::rate_limit) start(std::ranges::max_element(scores, {}, &FlawScore::size)->size);
-  if (std::isfinite(best.sum2)) best.sum2 = refine_flawed(log, max_steps, best.fit);
   return best;
+}
+
+/// Ends those fits that may be the best, or its rival: what is far behind after the first steps stays there.
+void finish(std::span<const ServoSample> log, std::vector<Candidate>& candidates) {
+  constexpr double far = 60.0;  // in twice the log of the likelihood
+  std::ranges::sort(candidates, {}, &Candidate::sum2);
+  double best2 = std::numeric_limits<double>::infinity(), rows = 0.0;
+  for (Candidate& each : candidates) {
+    if (!std::isfinite(each.sum2) || rows * std::log(each.sum2 / best2) > far) continue;
+    each.sum2 = refine_flawed(log, max_steps, each.fit);
+    if (each.sum2 >= best2) continue;
+    best2 = each.sum2;
+    rows = effective_rows(flawed_misfit(log, each.fit));
+  }
+  std::ranges::sort(candidates, {}, &Candidate::sum2);
 }
 
 /// The largest rate that is read for as long as a drive takes to reach it.
@@ -51,7 +66,7 @@ double lasting_rate(std::span<const ServoSample> log) {
 /// explains little. From the best points of a grid, since there is more than one minimum.
 Candidate limited(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr std::size_t num_starts = 3;
-  constexpr int first_steps = 12, max_steps = 40;
+  constexpr int first_limit_steps = 12;
   const double rate = lasting_rate(log), late_s = fit.params[ServoParam::tau] + fit.params[ServoParam::latency];
   std::vector<Candidate> grid;
   if (!(rate > 0.0)) return {ServoFlaw::rate_limit, fit};
@@ -70,7 +85,7 @@ Candidate limited(std::span<const ServoSample> log, const ServoFit& fit) {
   std::ranges::sort(grid, {}, &Candidate::sum2);
   Candidate best{ServoFlaw::rate_limit, fit};
   for (std::size_t i = 0; i < num_starts; ++i) {
-    grid[i].sum2 = refine_flawed(log, first_steps, grid[i].fit);
+    grid[i].sum2 = refine_flawed(log, first_limit_steps, grid[i].fit);
     if (grid[i].sum2 < best.sum2) best = grid[i];
   }
   best.sum2 = refine_flawed(log, max_steps, best.fit);
@@ -127,9 +142,9 @@ ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std
     const double sum2 = ground.misfit.squaredNorm();
     std::vector<Candidate> candidates;
     for (const std::size_t flaw : flaws)
-      if (std::ranges::count(fit.freed, flaw) == 0) candidates.push_back(freed(log, fit, ground, flaw));
+      if (std::ranges::count(fit.freed, flaw) == 0) candidates.push_back(begun(log, fit, ground, flaw));
     if (candidates.empty()) break;
-    std::ranges::sort(candidates, {}, &Candidate::sum2);
+    finish(log, candidates);
     const Candidate& best = candidates.front();
     const Evidence single = evidence_for(log, sum2, 1.0, best);
     const bool is_better = single.left > 0.0;

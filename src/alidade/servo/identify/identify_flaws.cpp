@@ -7,6 +7,7 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/pantilt/positioner.h"
 #include "alidade/pantilt/servo_plant.h"
+#include "alidade/servo/identify/decay.h"
 #include "alidade/servo/identify/levenberg.h"
 #include "alidade/servo/identify/sampled_log.h"
 
@@ -23,7 +24,11 @@ constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one
 class FlawedServo {
  public:
   FlawedServo(const ServoFit& fit, const ServoFlaws& flaws, double first_command)
-      : fit_(fit), flaws_(flaws), lagged_(goal_of(first_command, 0.0)) {
+      : fit_(fit),
+        flaws_(flaws),
+        is_limited_(flaws.max_rate_rad_s > 0.0 || flaws.max_acceleration_rad_s2 > 0.0),
+        decays_(fit.params[ServoParam::tau]),
+        lagged_(goal_of(first_command, 0.0)) {
     const double max_rate = flaws.max_rate_rad_s > 0.0 ? flaws.max_rate_rad_s : no_limit;
     if (fit.kind == ServoKind::angle) {
       AnglePlant plant{fit.params[ServoParam::gain], AngleUnit::rad, fit.params[ServoParam::tau]};
@@ -50,11 +55,18 @@ class FlawedServo {
       move(dt_s, goal);
       return;
     }
+    if (!is_limited_ && !(flaws_.backlash_rad > 0.0)) {
+      const LaggedMotion next = advanced_behind_lag(axis_.plant, lag_s, {now_, lagged_}, goal, dt_s);
+      now_ = next.motion;
+      lagged_ = next.lagged;
+      read();
+      return;
+    }
     constexpr double per_tau = 20.0, max_steps = 40.0;
     const double shortest_s = std::min(lag_s, fit_.params[ServoParam::tau]);
     const double steps = std::clamp(std::ceil(per_tau * dt_s / shortest_s), 1.0, max_steps), step_s = dt_s / steps;
+    const double rise = -std::expm1(-step_s / lag_s);
     for (double k = 0.0; k < steps; ++k) {
-      const double rise = -std::expm1(-step_s / lag_s);
       move(step_s, goal + (lagged_ - goal) * rise * lag_s / step_s);
       lagged_ += rise * (goal - lagged_);
     }
@@ -67,8 +79,26 @@ class FlawedServo {
     return past_dead_band(command, flaws_.dead_band) * (1.0 + difference) * (1.0 + flaws_.gain_drift * (share - 0.5));
   }
 
+  /// As `advanced` without limits: the steps of a log have two lengths.
+  void move_unlimited(double dt_s, double command) {
+    const auto [step_s, decay, rise] = decays_.over(dt_s);
+    const double goal = fit_.params[ServoParam::gain] * command;
+    if (fit_.kind == ServoKind::angle) {
+      now_.angle_rad = goal + decay * (now_.angle_rad - goal);
+    } else {
+      const double gap = now_.rate_rad_s - goal;
+      now_.angle_rad += goal * dt_s + gap * fit_.params[ServoParam::tau] * rise;
+      now_.rate_rad_s = goal + decay * gap;
+    }
+    read();
+  }
+
   /// The play follows piece by piece where the drive may turn back within a step.
   void move(double dt_s, double goal) {
+    if (!is_limited_) {
+      move_unlimited(dt_s, goal);
+      return;
+    }
     const auto* braking = std::get_if<AnglePlant>(&axis_.plant);
     if (braking == nullptr || !std::isfinite(braking->max_acceleration_rad_s2)) {
       now_ = advanced(axis_, now_, goal, dt_s);
@@ -92,6 +122,8 @@ class FlawedServo {
 
   const ServoFit& fit_;
   const ServoFlaws& flaws_;
+  bool is_limited_;
+  Decay decays_;
   ServoAxis axis_;
   AxisMotion now_;
   double lagged_, read_ = 0.0;
@@ -156,6 +188,10 @@ Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const Serv
   const auto num = static_cast<Index>(num_servo_params + fit.freed.size());
   Eigen::MatrixXd J(readings_of(log).size(), num);
   for (Index k = 0; k < num; ++k) {
+    if (k == ServoParam::zero) {
+      J.col(k).setOnes();
+      continue;
+    }
     const double step = step_of(log, fit, k);
     const bool is_at_edge = k == ServoParam::latency && fit.params[ServoParam::latency] < step;
     const ServoFit more = moved(fit, k, step), less = moved(fit, k, is_at_edge ? 0.0 : -step);

@@ -50,7 +50,9 @@ struct AlsoAsked {
 
 TrackReport followed(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                      const TrackerConfig& config, const Progress& progress, const AlsoAsked& also = {}) {
-  Tracker tracker({heads.begin(), heads.end()}, config);
+  TrackerConfig no_longer = config;  // a history than there are observations
+  no_longer.max_kept = std::min(config.max_kept, observations.size() + 1);
+  Tracker tracker({heads.begin(), heads.end()}, no_longer);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
   report.steps.reserve(observations.size());

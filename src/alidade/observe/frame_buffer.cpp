@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace alidade {
 
@@ -187,9 +188,11 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
     adjustment.solution = std::move(solution);
     adjustment.has_value = true;
   };
+  const int max_iterations = std::exchange(solve.max_iterations, config.max_iterations);
   attempt(config.start);
   for (const double focal : config.other_starts) attempt(with_focal(config.start, focal));
 
+  solve.max_iterations = max_iterations;
   solve_again(config, progress, solve, adjustment);
   adjustment.sigma_px = solve.sigma_px;
   return adjustment;

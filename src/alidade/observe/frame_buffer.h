@@ -55,6 +55,7 @@ struct AdjustConfig {
   RotatingCamera start;
   /// fx = fy to try one after the other beside the start's, normalised.
   std::vector<double> other_starts;
+  int max_iterations = 60;  ///< From each start: one that is near the answer is there after a dozen.
 };
 
 struct Adjustment {

@@ -82,6 +82,7 @@ Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, c
   AdjustConfig adjust_with;
   adjust_with.start = start_camera(config, scale);
   adjust_with.other_starts = {0.7, 2.5, 5.0, 10.0};
+  adjust_with.max_iterations = 20;  // a wrong reading has no bottom to reach
   adjust_with.reject = false;
   const Adjustment adjustment = adjust(buffer, adjust_with, progress);
   if (!adjustment.has_value) return {};

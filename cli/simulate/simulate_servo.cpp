@@ -21,6 +21,7 @@ struct SimulateServoArgs {
   bool chirp = false, one_step = false;
   double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = no_limit_deg_s, max_acceleration_deg_s2 = 1e9;
   double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0;
+  Mode resonance{.hz = 0.0, .damping = 0.05, .share = 1.0};
   double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
 };
 
@@ -40,6 +41,7 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
   scene.axis.dead_band = args.dead_band;
   scene.axis.backlash_rad = deg * args.backlash_deg;
   scene.axis.second_tau_s = args.second_tau_s;
+  scene.mode = args.resonance;
   scene.axis.command_delay_s = args.latency_s;
   scene.is_chirp = args.chirp;
   if (args.one_step) scene.steps = {1.0};
@@ -103,6 +105,11 @@ void add_servo_scenario(App& app) {
   add_number(command, "--backlash-deg", args->backlash_deg,
              "Play between what drives the axis and the angle that is read", 0.0, 90.0);
   add_number(command, "--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);
+  add_number(command, "--resonance-hz", args->resonance.hz,
+             "Natural frequency of what swings behind the drive; 0: nothing does", 0.0, 1000.0);
+  add_number(command, "--resonance-damping", args->resonance.damping, "Its damping ratio", 1e-3, 0.9);
+  add_number(command, "--resonance-share", args->resonance.share,
+             "Of the motion, the part that goes through it; the rest is rigid", -10.0, 10.0);
   add_number(command, "--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
   add_number(command, "--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
   add_number(command, "--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);

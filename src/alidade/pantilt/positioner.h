@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <deque>
 #include <span>
 #include <vector>
@@ -70,5 +71,36 @@ struct PositionCommand {
 [[nodiscard]] std::vector<double> positioner_response(const PositionerParams& params, double start_rad,
                                                       std::span<const PositionCommand> commands,
                                                       std::span<const double> times_s);
+
+/// What swings behind an axis: of its motion a part goes through a lightly damped mode, the rest is rigid,
+/// y = (1 − share) x + share q with q'' = ω² (x − q) − 2ζω q'. A share of one: all of the load hangs on a spring; of
+/// less than nothing: what is read sits before the spring.
+struct Mode {
+  double hz = 0.0;  ///< Its natural frequency ω / 2π; 0: none.
+  double damping = 0.0, share = 1.0;
+  bool operator==(const Mode&) const = default;
+};
+
+/// q in time. Exact while its drive goes as a cubic; 0 < damping < 1.
+class Resonance {
+ public:
+  /// It has gone along with the drive's rate for long.
+  Resonance(const Mode& mode, const DriveMotion& drive);
+
+  /// dt later, the drive's angle and rate meanwhile having gone from one to the other.
+  void advance(double dt_s, const DriveMotion& from, const DriveMotion& to);
+  [[nodiscard]] double angle_rad() const { return angle_; }
+
+ private:
+  /// Of the homogeneous equation after dt: a regular log has few lengths.
+  struct Swing {
+    double dt_s = -1.0, decay = 1.0, cosine = 1.0, sine = 0.0;
+  };
+  const Swing& swing_over(double dt_s);
+
+  double omega_, damping_, damped_omega_;
+  double angle_, rate_;
+  std::array<Swing, 2> known_{};
+};
 
 }  // namespace alidade

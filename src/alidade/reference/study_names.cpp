@@ -58,6 +58,9 @@ clock_rate              1      by which a second of the angles' clock is longer 
 earlier_command         -      what the axis followed until the first row's command took effect, less that command
 gain_difference         1      the gain is 1 + it times the stated for commands above zero, 1 − it below
 gain_drift              1      by so much of it the gain grows over the log; the stated one is its middle's
+resonance_hz            Hz     natural frequency of what swings behind the drive
+resonance_damping       1      its damping ratio
+resonance_share         1      of the motion, what goes through it; the rest is rigid
 evidence.*              1      of each of these: 2 ln of the likelihood ratio for it
 encoder_step_rad        rad    one count
 encoder_hz              Hz     how often it is sampled, where its angle is held for several rows; 0: not seen

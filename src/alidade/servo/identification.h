@@ -52,17 +52,21 @@ struct ServoFlaws {
   double earlier_command = 0.0;
   double gain_difference = 0.0;  ///< The gain is 1 + it times the stated for commands above zero, 1 − it below.
   double gain_drift = 0.0;       ///< By so much of it the gain grows over the log; the stated one is its middle's.
+  /// What swings behind the drive: y = (1 − share) x + share q with q'' = ω² (x − q) − 2ζω q', ω / 2π its natural
+  /// frequency, ζ its damping ratio. A share of one: all that is read hangs on a spring.
+  double resonance_hz = 0.0, resonance_damping = 0.0, resonance_share = 0.0;
 };
-inline constexpr std::size_t num_servo_flaws = 9;
+inline constexpr std::size_t num_servo_flaws = 12;
 inline constexpr std::array<double ServoFlaws::*, num_servo_flaws> servo_flaws{
-    &ServoFlaws::max_rate_rad_s,  &ServoFlaws::max_acceleration_rad_s2,
-    &ServoFlaws::dead_band,       &ServoFlaws::backlash_rad,
-    &ServoFlaws::second_tau_s,    &ServoFlaws::clock_rate,
-    &ServoFlaws::earlier_command, &ServoFlaws::gain_difference,
-    &ServoFlaws::gain_drift};
+    &ServoFlaws::max_rate_rad_s,    &ServoFlaws::max_acceleration_rad_s2,
+    &ServoFlaws::dead_band,         &ServoFlaws::backlash_rad,
+    &ServoFlaws::second_tau_s,      &ServoFlaws::clock_rate,
+    &ServoFlaws::earlier_command,   &ServoFlaws::gain_difference,
+    &ServoFlaws::gain_drift,        &ServoFlaws::resonance_hz,
+    &ServoFlaws::resonance_damping, &ServoFlaws::resonance_share};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_names{
-    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band",       "backlash_rad", "second_tau_s",
-    "clock_rate",     "earlier_command",         "gain_difference", "gain_drift"};
+    "max_rate_rad_s",  "max_acceleration_rad_s2", "dead_band",  "backlash_rad", "second_tau_s",      "clock_rate",
+    "earlier_command", "gain_difference",         "gain_drift", "resonance_hz", "resonance_damping", "resonance_share"};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
     "a limit of its rate",
     "a limit of its acceleration",
@@ -72,7 +76,10 @@ inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
     "a drift between the clocks of commands and angles",
     "another command before the first row's",
     "a gain that differs by the command's sign",
-    "a gain that drifts"};
+    "a gain that drifts",
+    "a resonance",
+    "the resonance's damping ratio",
+    "the resonance's share of the motion"};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/s",
                                                                            "rad/s^2",
                                                                            "units of command",
@@ -81,7 +88,10 @@ inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/
                                                                            "s/s",
                                                                            "units of command",
                                                                            "of the gain",
-                                                                           "of the gain over the log"};
+                                                                           "of the gain over the log",
+                                                                           "Hz",
+                                                                           "of the critical",
+                                                                           "of all"};
 
 struct ServoFit {
   ServoKind kind = ServoKind::angle;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <deque>
 #include <numbers>
+#include <optional>
 
 #include "alidade/pantilt/intrinsics_history.h"
 #include "alidade/simulate/track.h"
@@ -62,6 +63,35 @@ double command_of(const ServoLogScene& scene, double t_s) {
   const double sweep_hz = scene.low_hz + 0.5 * (scene.high_hz - scene.low_hz) * t_s / scene.duration_s;
   return scene.amplitude * std::sin(2.0 * std::numbers::pi * sweep_hz * t_s);
 }
+
+/// An axis and what swings behind it.
+class SwingingAxis {
+ public:
+  SwingingAxis(const ServoAxis& axis, const Mode& mode) : axis_(axis, {}), mode_(mode) {
+    if (mode.hz > 0.0) swinging_.emplace(mode, DriveMotion{});
+  }
+  void send(double command) { axis_.send(command); }
+  void advance(double dt_s) {
+    constexpr double longest_s = 1e-4;  // for so long the drive's motion is a line
+    const double steps = swinging_ ? std::max(1.0, std::ceil(dt_s / longest_s)) : 1.0, step_s = dt_s / steps;
+    for (double k = 0.0; k < steps; ++k) {
+      const double before = axis_.motion().angle_rad;
+      axis_.advance(step_s);
+      if (!swinging_ || !(step_s > 0.0)) continue;
+      const double after = axis_.motion().angle_rad, rate = (after - before) / step_s;
+      swinging_->advance(step_s, {before, rate}, {after, rate});
+    }
+  }
+  [[nodiscard]] double angle_rad() const {
+    const double drive = axis_.motion().angle_rad;
+    return swinging_ ? drive + mode_.share * (swinging_->angle_rad() - drive) : drive;
+  }
+
+ private:
+  DelayedAxis axis_;
+  Mode mode_;
+  std::optional<Resonance> swinging_;
+};
 
 }  // namespace
 
@@ -170,7 +200,7 @@ std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uin
   // Commands wait here: a DelayedAxis has room for a few only.
   ServoAxis prompt = scene.axis;
   prompt.command_delay_s = 0.0;
-  DelayedAxis axis(prompt, {});
+  SwingingAxis axis(prompt, scene.mode);
   std::deque<ServoLogRow> waiting;
   std::vector<ServoLogRow> rows;
   const int num_rows = static_cast<int>(std::floor(scene.duration_s * scene.rate_hz)) + 1;
@@ -179,7 +209,7 @@ std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uin
     row.t_s = k / scene.rate_hz;
     row.command = command_of(scene, row.t_s);
     row.angle_rad =
-        rounded_to(scene.zero_rad + axis.motion().angle_rad + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
+        rounded_to(scene.zero_rad + axis.angle_rad() + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
     rows.push_back(row);
     waiting.push_back(row);
     const double next_s = (k + 1) / scene.rate_hz;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/pantilt/head.h"
+#include "alidade/pantilt/positioner.h"
 #include "alidade/pantilt/servo_plant.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/target_path.h"
@@ -55,6 +56,7 @@ class SimulatedHead {
 /// A log as `alidade identify` reads it: one axis under steps of several sizes to both sides, or a chirp.
 struct ServoLogScene {
   ServoAxis axis;
+  Mode mode = {};  ///< What swings behind it.
   bool is_chirp = false;
   double amplitude = 200.0;  ///< Of the command.
   double duration_s = 5.0, rate_hz = 100.0;

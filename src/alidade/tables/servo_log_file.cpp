@@ -56,7 +56,9 @@ std::string servo_plant_text(const ServoFit& fit) {
     const bool is_of_log =
         servo_flaws[flaw] == &ServoFlaws::clock_rate || servo_flaws[flaw] == &ServoFlaws::earlier_command;
     if (is_of_log) continue;  // not of the axis
-    if (servo_flaws[flaw] == &ServoFlaws::gain_difference || servo_flaws[flaw] == &ServoFlaws::gain_drift) {
+    const bool is_of_a_resonance = name.starts_with("resonance");
+    if (is_of_a_resonance || servo_flaws[flaw] == &ServoFlaws::gain_difference ||
+        servo_flaws[flaw] == &ServoFlaws::gain_drift) {
       flaw_sigmas += fmt::format(", {} {:.3g} (no plant has it)", name, size);
       continue;
     }

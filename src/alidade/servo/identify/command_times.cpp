@@ -1,4 +1,3 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -194,14 +193,6 @@ decltype(ServoFit::cov) of_times(const Eigen::MatrixXd& A) {
   const Eigen::MatrixXd known = Ldlt(scaled.topLeftCorner<num_servo_params, num_servo_params>()).inverse();
   const auto own = scale.head<num_servo_params>().asDiagonal();
   return own * (all.topLeftCorner<num_servo_params, num_servo_params>() - known) * own;
-}
-
-/// ln det of a normal matrix.
-double log_determinant(const Eigen::MatrixXd& A) {
-  const Eigen::VectorXd scale = A.diagonal().cwiseSqrt().cwiseMax(1e-300);
-  const Eigen::VectorXd down = scale.cwiseInverse();
-  const Eigen::VectorXd pivots = Eigen::LDLT<Eigen::MatrixXd>(down.asDiagonal() * A * down.asDiagonal()).vectorD();
-  return pivots.array().max(1e-300).log().sum() + 2.0 * scale.array().log().sum();
 }
 
 /// Whether one linearisation says that it is worth trying: of times that are right each explains σ² on average.

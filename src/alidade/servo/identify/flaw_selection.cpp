@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "alidade/servo/identify/identify_flaws.h"
 
@@ -92,11 +93,6 @@ Candidate limited(std::span<const ServoSample> log, const ServoFit& fit) {
   return best;
 }
 
-double lag_one_correlation(const Eigen::VectorXd& misfit) {
-  const Index n = misfit.size();
-  return misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300);
-}
-
 bool is_limited(const ServoFit& fit) {
   return std::ranges::any_of(fit.freed, [](std::size_t flaw) { return flaw <= ServoFlaw::acceleration_limit; });
 }
@@ -132,11 +128,29 @@ void note_rivals(std::span<const ServoSample> log, const std::vector<Candidate>&
 
 }  // namespace
 
-ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std::span<const std::size_t> flaws,
+double lag_one_correlation(const Eigen::VectorXd& misfit) {
+  const Index n = misfit.size();
+  return misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300);
+}
+
+std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
+  constexpr double max_correlation = 0.3, min_sigmas = 3.5;
+  const FlawGround ground = flaw_ground(log, fit);
+  std::vector<std::size_t> all(ServoFlaw::resonance);
+  std::iota(all.begin(), all.end(), 0);
+  if (std::abs(lag_one_correlation(ground.misfit)) > max_correlation) return all;
+  const double sum2 = ground.misfit.squaredNorm(), least2 = min_sigmas * min_sigmas * fit.rms_rad * fit.rms_rad;
+  std::vector<std::size_t> indicated;
+  for (const std::size_t flaw : all)
+    if (sum2 > 0.0 && flaw_scores(log, fit, ground, flaw).front().gain2 > least2) indicated.push_back(flaw);
+  return std::ranges::all_of(indicated, is_of_the_log) ? indicated : all;
+}
+
+ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& start, std::span<const std::size_t> flaws,
                     std::vector<ServoRival>& rivals) {
-  constexpr std::size_t max_freed = 3;
+  const std::size_t max_freed = start.freed.size() + 3;
   constexpr double max_correlation = 0.3;
-  ServoFit fit = plain;
+  ServoFit fit = start;
   while (fit.freed.size() < max_freed) {
     const FlawGround ground = flaw_ground(log, fit);
     const double sum2 = ground.misfit.squaredNorm();

@@ -1,123 +1,21 @@
 #include "alidade/servo/identify/identify.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
+#include <tuple>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/identify_clusters.h"
 #include "alidade/servo/identify/identify_flaws.h"
-#include "alidade/servo/identify/levenberg.h"
 #include "alidade/servo/identify/log_times.h"
-#include "alidade/servo/identify/ordinary_flaws.h"
 #include "alidade/servo/identify/sampled_log.h"
 
 namespace alidade {
 namespace {
-
-/// Gain, zero and start that fit best at a time constant and latency, and what is left.
-struct LinearFit {
-  ServoParams params = ServoParams::Zero();
-  double difference = 0.0;  ///< Of the gain, by the command's sign.
-  double sum2 = std::numeric_limits<double>::infinity();
-};
-
-/// The response to commands of one sign: by it a gain that differs by the sign changes the response.
-Eigen::VectorXd rectified_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
-  std::vector<ServoSample> rows(log.begin(), log.end());
-  for (ServoSample& row : rows) row.command = std::abs(row.command);
-  return servo_response(rows, kind, params).J.col(ServoParam::gain);
-}
-
-LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s,
-                     const Eigen::VectorXd& readings, bool by_sign) {
-  ServoParams params;
-  params << 1.0, tau_s, latency_s, 0.0, 0.0;
-  const ServoResponse response = servo_response(log, kind, params);
-  Eigen::MatrixXd A(readings.size(), by_sign ? 4 : 3);  // the response is linear in these
-  A.leftCols<3>() << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero),
-      response.J.col(ServoParam::start);
-  if (by_sign) A.col(3) = rectified_response(log, kind, params);
-  const Eigen::VectorXd best = least_squares(A, readings);
-  LinearFit fit;
-  fit.params << best[0], tau_s, latency_s, best[1], best[2];
-  if (by_sign && best[0] != 0.0) fit.difference = best[3] / best[0];
-  fit.sum2 = (A * best - readings).squaredNorm();
-  return fit;
-}
-
-/// Every n-th row, so that a search over a long log stays short; commands between are piecewise constant.
-std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
-  constexpr std::size_t most = 1500;
-  const std::size_t stride = (log.size() + most - 1) / most;
-  std::vector<ServoSample> rows;
-  for (std::size_t i = 0; i < log.size(); ++i)
-    if (i % stride == 0 || log[i].command != log[i - 1].command) rows.push_back(log[i]);
-  return rows;
-}
-
-/// The best of a grid in time constant (by factors) and latency (up to a third of the log).
-LinearFit searched(std::span<const ServoSample> log, ServoKind kind, bool by_sign = false) {
-  const std::vector<ServoSample> rows = thinned(log);
-  const Eigen::VectorXd readings = readings_of(rows);
-  const double duration_s = log.back().t_s - log.front().t_s;
-  const double step_s = duration_s / static_cast<double>(log.size() - 1);
-  std::vector<double> latencies{0.0};
-  for (double late_s = 0.5 * step_s; late_s < duration_s / 3.0; late_s *= 1.4) latencies.push_back(late_s);
-  LinearFit best;
-  for (double tau_s = 0.3 * step_s; tau_s < 3.0 * duration_s; tau_s *= 1.6) {
-    for (const double latency_s : latencies) {
-      const LinearFit fit = linear_fit(rows, kind, tau_s, latency_s, readings, by_sign);
-      if (fit.sum2 < best.sum2) best = fit;
-    }
-  }
-  return best;
-}
-
-/// (JᵀJ)⁻¹, by parameters scaled so that their units do not matter; none where it cannot be solved.
-std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J) {
-  const Eigen::MatrixXd JtJ = J.transpose() * J;
-  const Eigen::VectorXd scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * JtJ * scale.asDiagonal();
-  const Ldlt ldlt(scaled);
-  if (!(ldlt.min_pivot() > 1e-10)) return std::nullopt;
-  return scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
-}
-
-/// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
-ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params) {
-  const Eigen::VectorXd readings = readings_of(log);
-  const double dof = static_cast<double>(readings.size()) - num_servo_params;
-  // 5 to 15 steps are typical; a kink at a sampled latency takes more
-  const LevenbergOutcome descent = levenberg(
-      {.max_steps = 60, .first_damping = 1e-6, .tolerance = 1e-12}, params,
-      [&](const ServoParams& at) -> Eigen::VectorXd { return servo_response(log, kind, at).angle_rad - readings; },
-      [&](const ServoParams& at) { return servo_response(log, kind, at).J; },
-      [](const ServoParams& from, const auto& step) { return within_meaning(from, ServoParams(from + step)); });
-  ServoFit fit;
-  fit.kind = kind;
-  fit.has_converged = descent.has_converged;
-  fit.params = params;
-  fit.rms_rad = std::sqrt(descent.sum2 / dof);
-  const auto inverse = inverse_normal(servo_response(log, kind, params).J);
-  fit.is_observable = inverse.has_value();
-  if (inverse) fit.cov = fit.cov_model = fit.rms_rad * fit.rms_rad * *inverse;
-  return fit;
-}
-
-double lag_one(const std::vector<double>& residuals) {
-  double product = 0.0, square = 0.0;
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    square += residuals[i] * residuals[i];
-    if (i > 0) product += residuals[i] * residuals[i - 1];
-  }
-  return square > 0.0 ? product / square : 0.0;
-}
 
 /// What blocks of rows say of the covariance, in scaled parameters so that their units do not matter.
 void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, ServoIdentification& result) {
@@ -142,22 +40,6 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
   }
   count_ordinary_flaws(log, J, *inverse, result);
   count_time_stamps(log, J, *inverse, result);
-}
-
-/// Which flaws to try: all where the residuals of a linear fit indicate one of the axis, else those of the log alone.
-std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
-  constexpr double max_correlation = 0.3, min_sigmas = 3.5;
-  const FlawGround ground = flaw_ground(log, fit);
-  const std::vector<double> residuals(ground.misfit.data(), ground.misfit.data() + ground.misfit.size());
-  std::vector<std::size_t> all(num_servo_flaws);
-  std::iota(all.begin(), all.end(), 0);
-  if (std::abs(lag_one(residuals)) > max_correlation) return all;
-  const double sum2 = ground.misfit.squaredNorm(), least2 = min_sigmas * min_sigmas * fit.rms_rad * fit.rms_rad;
-  std::vector<std::size_t> indicated;
-  for (const std::size_t flaw : all)
-    if (sum2 > 0.0 && flaw_scores(log, fit, ground, flaw).front().gain2 > least2) indicated.push_back(flaw);
-  const bool is_of_log = std::ranges::all_of(indicated, is_of_the_log);
-  return is_of_log ? indicated : all;
 }
 
 /// The index of the selected one of two fits, angle and rate.
@@ -192,6 +74,7 @@ struct Solution {
   std::vector<ZeroSlip> slips;
 
   [[nodiscard]] const ServoFit& fit() const { return fits[believed]; }
+  [[nodiscard]] bool is_plain() const { return fit().freed.empty() && slips.empty() && lost_commands.empty(); }
 };
 
 /// A gain that differs by the command's sign makes a rate plant drift, which may be all that a search without it sees:
@@ -199,8 +82,7 @@ struct Solution {
 void try_gain_by_sign(std::span<const ServoSample> log, std::span<const std::size_t> flaws, ServoFit& fit,
                       std::vector<ServoRival>& rivals) {
   constexpr double max_correlation = 0.3, clearly = 0.9;
-  const Eigen::VectorXd misfit = flawed_misfit(log, fit);
-  if (!(std::abs(lag_one({misfit.data(), misfit.data() + misfit.size()})) > max_correlation)) return;
+  if (!(std::abs(lag_one_correlation(flawed_misfit(log, fit))) > max_correlation)) return;
   const LinearFit start = searched(log, fit.kind, true);
   const auto rows = static_cast<double>(readings_of(thinned(log)).size());
   if (!(std::abs(start.difference) < 1.0) || start.sum2 > rows * fit.rms_rad * fit.rms_rad) return;
@@ -240,8 +122,7 @@ double evidence_of_flaws(double rows, const ServoFit& plain, const ServoFit& fla
 
 bool is_white(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr double max_correlation = 0.3;
-  const Eigen::VectorXd misfit = flawed_misfit(log, fit);
-  return std::abs(lag_one({misfit.data(), misfit.data() + misfit.size()})) < max_correlation;
+  return std::abs(lag_one_correlation(flawed_misfit(log, fit))) < max_correlation;
 }
 
 double price_of_faults(std::span<const ServoSample> log, const Solution& solution) {
@@ -255,14 +136,16 @@ struct Explained {
   Solution solution;
   double evidence = 0.0;
 };
+double evidence_against(const Solution& before, const Solution& found) {
+  const double rows = effective_rows(flawed_misfit(found.log, found.fit()));
+  const double more = static_cast<double>(found.fit().freed.size()) - static_cast<double>(before.fit().freed.size());
+  return 2.0 * rows * std::log(before.fit().rms_rad / found.fit().rms_rad) - more * std::log(rows);
+}
 Explained explained(const Solution& before, std::vector<ServoSample> log, ServoKindRule rule, double price) {
   const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
                                      refined(log, ServoKind::rate, searched(log, ServoKind::rate).params)};
   Explained found{with_flaws_tried(std::move(log), fits, rule)};
-  const ServoFit& fit = found.solution.fit();
-  const double rows = effective_rows(flawed_misfit(found.solution.log, fit));
-  const double more = static_cast<double>(fit.freed.size()) - static_cast<double>(before.fit().freed.size());
-  found.evidence = 2.0 * rows * std::log(before.fit().rms_rad / fit.rms_rad) - more * std::log(rows) - price;
+  found.evidence = evidence_against(before, found.solution) - price;
   found.solution.times = before.times;
   found.solution.lost_commands = before.lost_commands;
   found.solution.slips = before.slips;
@@ -326,10 +209,9 @@ Solution with_faults_tried(const Solution& before, ServoKindRule rule) {
 
 /// As logged; or with commands that were given before their rows, if they explain more than flaws of the axis, lost
 /// commands and slips do.
-Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s, ServoKindRule rule) {
-  const std::vector<ServoSample> log = sampled_log(as_read, sampled_t_s);
-  const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
-                                     refined(log, ServoKind::rate, searched(log, ServoKind::rate).params)};
+Solution without_resonance(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s,
+                           const Solution& plain, ServoKindRule rule) {
+  const auto& [log, fits] = std::tie(plain.log, plain.fits);
   const Solution as_logged = with_faults_tried(with_flaws_tried(log, fits, rule), rule);
   const std::array<std::optional<CommandTimes>, 2> times{command_times(log, fits[0]), command_times(log, fits[1])};
   std::array<ServoFit, 2> earlier = fits;
@@ -346,6 +228,72 @@ Solution solved(std::span<const ServoSample> as_read, const std::vector<double>&
   const double of_times = times[kind]->evidence + evidence_of_flaws(rows, earlier[kind], with_times.fit());
   const double otherwise = evidence_of_flaws(rows, fits[kind], as_logged.fit()) - price_of_faults(log, as_logged);
   return of_times > otherwise ? with_faults_tried(with_times, rule) : as_logged;
+}
+
+/// A resonance in a fit of this log, against what is believed.
+std::optional<Explained> resonant(const Solution& base, const ServoFit& start, const Solution& believed) {
+  std::optional<ServoFit> fit = with_resonance(base.log, start);
+  if (!fit) return std::nullopt;
+  Explained found{base};
+  found.solution.believed = start.kind == ServoKind::rate ? 1 : 0;
+  found.solution.fits[found.solution.believed] = *fit;
+  found.solution.rivals[found.solution.believed].clear();
+  found.evidence = evidence_against(believed, found.solution) + price_of_faults(base.log, believed) -
+                   price_of_faults(base.log, base);
+  return found;
+}
+
+/// Of both kinds that a log without anything else may be, and of what is believed where that leaves more.
+Explained most_resonant(const Solution& as_logged, const Solution& believed, ServoKindRule rule, bool is_asked) {
+  constexpr double hopeless = 2.0, nothing = -std::numeric_limits<double>::infinity();
+  Explained best{believed, nothing};
+  const auto offer = [&](const Solution& base, const ServoFit& start) {
+    auto trial = resonant(base, start, believed);
+    if (trial && trial->evidence > best.evidence) best = *std::move(trial);
+  };
+  const double duration_s = as_logged.log.back().t_s - as_logged.log.front().t_s;
+  for (const ServoFit& start : as_logged.fits) {
+    const bool is_other = start.kind != as_logged.fit().kind;
+    if (start.params[ServoParam::tau] > duration_s)
+      continue;  // an angle plant that follows for ever is of the other kind
+    if (is_other && (rule != ServoKindRule::automatic || start.rms_rad > hopeless * as_logged.fit().rms_rad)) continue;
+    if (!believed.times) offer(as_logged, start);
+  }
+  const bool is_done = best.evidence > 0.0 && indicated_flaws(best.solution.log, best.solution.fit()).empty();
+  if (is_asked && !is_done && (!believed.is_plain() || believed.times)) offer(believed, believed.fit());
+  return best;
+}
+
+/// With a resonance, where the log shows it and it explains clearly more. Tried when all else has been, since it looks
+/// like much else, and never where commands are of one size, which do not tell it from that.
+Solution with_resonance_tried(const Solution& as_logged, const Solution& believed, ServoKindRule rule) {
+  constexpr std::size_t several = 2;
+  constexpr double margin = 12.0, clear = 10.0;
+  if (num_sizes(as_logged.log, several) < several) return believed;
+  const bool is_asked = asks_for_resonance(believed.log, believed.fit());
+  if (!is_asked && (believed.is_plain() || !asks_for_resonance(as_logged.log, as_logged.fit()))) return believed;
+  Explained best = most_resonant(as_logged, believed, rule, is_asked);
+  Solution& found = best.solution;
+  if (is_asked && best.evidence > 0.0) {
+    ServoFit& fit = found.fits[found.believed];
+    fit = with_flaws(found.log, fit, indicated_flaws(found.log, fit), found.rivals[found.believed]);
+    best.evidence =
+        evidence_against(believed, found) + price_of_faults(found.log, believed) - price_of_faults(found.log, found);
+  }
+  if (best.evidence > (believed.is_plain() ? margin : clear)) return found;
+  Solution result = believed;
+  if (best.evidence > -clear && !believed.fit().freed.empty())
+    result.rivals[result.believed].push_back(
+        {believed.fit().freed.front(), ServoFlaw::resonance, std::max(0.0, -best.evidence)});
+  return result;
+}
+
+Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s, ServoKindRule rule) {
+  const std::vector<ServoSample> log = sampled_log(as_read, sampled_t_s);
+  const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
+                                     refined(log, ServoKind::rate, searched(log, ServoKind::rate).params)};
+  const Solution as_logged{log, fits, {}, believed_of(fits, rule), std::nullopt, {}, {}};
+  return with_resonance_tried(as_logged, without_resonance(as_read, sampled_t_s, as_logged, rule), rule);
 }
 
 void count_command_times(std::span<const ServoSample> log, const std::optional<CommandTimes>& times,
@@ -389,7 +337,7 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
   const Eigen::MatrixXd J = is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit);
   set_clusters(log, with_slips(log, found.slips, J), result);
   result.status = status_of(result.fit);
-  result.lag_one_correlation = lag_one(result.residual_rad);
+  result.lag_one_correlation = lag_one_correlation(residuals);
   constexpr std::size_t several = 2;
   if (num_sizes(log, several) < several && result.fit.is_observable) result.hidden = hidden_flaws(log, result.fit);
   if (held) count_by_row(log, held->sigma_phase_s, result);

@@ -16,12 +16,22 @@ std::vector<ServoCause> servo_causes(std::span<const ServoSample> log, const Ser
   const double dof =
       static_cast<double>(ground.misfit.size()) - num_servo_params - static_cast<double>(fit.freed.size()) - 1.0;
   const double sum2 = ground.misfit.squaredNorm();
-  for (std::size_t flaw = 0; flaw < num_servo_flaws; ++flaw) {
+  std::vector<ServoFlaws> others;
+  for (std::size_t flaw = 0; flaw < ServoFlaw::resonance; ++flaw) {
     if (std::ranges::count(fit.freed, flaw) > 0) continue;
     const FlawScore best = flaw_scores(log, fit, ground, flaw).front();
     const double sigmas = std::sqrt(best.gain2 * dof / std::max(sum2 - best.gain2, 1e-6 * sum2));
-    if (sigmas > sigmas_of_a_cause)
-      causes.push_back({servo_flaw_words[flaw], best.size, servo_flaw_units[flaw], sigmas});
+    if (!(sigmas > sigmas_of_a_cause)) continue;
+    causes.push_back({servo_flaw_words[flaw], best.size, servo_flaw_units[flaw], sigmas});
+    others.push_back(fit.flaws);
+    others.back().*servo_flaws[flaw] = best.size;
+  }
+  constexpr std::size_t several = 2;
+  if (std::ranges::count(fit.freed, std::size_t{ServoFlaw::resonance}) == 0 && num_sizes(log, several) >= several) {
+    const ResonanceScore best = resonance_score(log, fit, ground, others);
+    if (best.sigmas > sigmas_of_a_resonance)
+      causes.push_back(
+          {servo_flaw_words[ServoFlaw::resonance], best.hz, servo_flaw_units[ServoFlaw::resonance], best.sigmas});
   }
   std::ranges::sort(causes, std::greater{}, &ServoCause::sigmas);
   return causes;

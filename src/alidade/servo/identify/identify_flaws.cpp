@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/pantilt/positioner.h"
@@ -19,6 +20,7 @@ using Eigen::Index;
 constexpr double no_limit = 1e9;
 constexpr double gain_unit = 0.05, max_gain_change = 0.9;  ///< Of a step of one, and at most.
 constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one; beyond it nobody calls it a clock.
+constexpr double min_damping = 5e-3, max_damping = 0.9;    ///< Of what swings.
 
 /// A servo half-way through its log: an axis of gain and flaws as fitted, which counts its commands from zero.
 class FlawedServo {
@@ -44,6 +46,9 @@ class FlawedServo {
       now_.rate_rad_s = fit.params[ServoParam::start];
     }
     read_ = now_.angle_rad;
+    if (flaws.resonance_hz > 0.0)
+      swinging_.emplace(Mode{flaws.resonance_hz, flaws.resonance_damping, flaws.resonance_share},
+                        DriveMotion{now_.angle_rad, now_.rate_rad_s});
   }
   [[nodiscard]] double read_rad() const { return read_; }
 
@@ -55,7 +60,7 @@ class FlawedServo {
       move(dt_s, goal);
       return;
     }
-    if (!is_limited_ && !(flaws_.backlash_rad > 0.0)) {
+    if (!is_limited_ && !(flaws_.backlash_rad > 0.0) && !swinging_) {
       const LaggedMotion next = advanced_behind_lag(axis_.plant, lag_s, {now_, lagged_}, goal, dt_s);
       now_ = next.motion;
       lagged_ = next.lagged;
@@ -90,19 +95,13 @@ class FlawedServo {
       now_.angle_rad += goal * dt_s + gap * fit_.params[ServoParam::tau] * rise;
       now_.rate_rad_s = goal + decay * gap;
     }
-    read();
   }
 
   /// The play follows piece by piece where the drive may turn back within a step.
   void move(double dt_s, double goal) {
-    if (!is_limited_) {
-      move_unlimited(dt_s, goal);
-      return;
-    }
     const auto* braking = std::get_if<AnglePlant>(&axis_.plant);
     if (braking == nullptr || !std::isfinite(braking->max_acceleration_rad_s2)) {
-      now_ = advanced(axis_, now_, goal, dt_s);
-      read();
+      lag(dt_s, goal);
       return;
     }
     const PositionerParams drive{.rate_rad_s = braking->max_rate_rad_s,
@@ -110,14 +109,41 @@ class FlawedServo {
                                  .time_constant_s = braking->tau_s};
     DriveMotion motion{now_.angle_rad, now_.rate_rad_s};
     while (dt_s > 0.0) {
-      dt_s -= advance_drive(drive, braking->gain * goal, dt_s, motion);
+      const DriveMotion before = motion;
+      const double step_s = advance_drive(drive, braking->gain * goal, dt_s, motion);
+      dt_s -= step_s;
       now_ = {motion.angle_rad, motion.rate_rad_s};
+      if (swinging_) swinging_->advance(step_s, before, motion);
       read();
     }
   }
+  /// What swings takes the drive's motion for a cubic: over a quarter of its time constant that is so to 10⁻⁵ of it.
+  void lag(double dt_s, double goal) {
+    constexpr double per_tau = 4.0, max_steps = 40.0;
+    const double tau_s = fit_.params[ServoParam::tau];
+    const double steps = swinging_ ? std::clamp(std::ceil(per_tau * dt_s / tau_s), 1.0, max_steps) : 1.0;
+    const double step_s = dt_s / steps;
+    for (double k = 0.0; k < steps; ++k) {
+      const DriveMotion before{now_.angle_rad, swinging_ ? rate_under(goal) : 0.0};
+      if (is_limited_)
+        now_ = advanced(axis_, now_, goal, step_s);
+      else
+        move_unlimited(step_s, goal);
+      if (swinging_) swinging_->advance(step_s, before, {now_.angle_rad, rate_under(goal)});
+      read();
+    }
+  }
+  [[nodiscard]] double rate_under(double goal) const {
+    const auto* plant = std::get_if<AnglePlant>(&axis_.plant);
+    if (plant == nullptr) return now_.rate_rad_s;
+    const double rate = (plant->gain * goal - now_.angle_rad) / plant->tau_s;
+    return std::clamp(rate, -plant->max_rate_rad_s, plant->max_rate_rad_s);
+  }
   void read() {
     const double half = 0.5 * flaws_.backlash_rad;
-    read_ = std::clamp(read_, now_.angle_rad - half, now_.angle_rad + half);
+    double angle = now_.angle_rad;
+    if (swinging_) angle += flaws_.resonance_share * (swinging_->angle_rad() - angle);
+    read_ = std::clamp(read_, angle - half, angle + half);
   }
 
   const ServoFit& fit_;
@@ -126,6 +152,7 @@ class FlawedServo {
   Decay decays_;
   ServoAxis axis_;
   AxisMotion now_;
+  std::optional<Resonance> swinging_;
   double lagged_, read_ = 0.0;
 };
 
@@ -134,6 +161,7 @@ double unit_of(const ServoFit& fit, std::size_t flaw) {
   constexpr double turn_rad = 0.1;
   if (flaw == ServoFlaw::clock_rate) return clock_unit;
   if (flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift) return gain_unit;
+  if (flaw == ServoFlaw::resonance_share) return 1.0;
   if (flaw == ServoFlaw::earlier_command) return turn_rad / std::max(std::abs(fit.params[ServoParam::gain]), 1e-300);
   return fit.flaws.*servo_flaws[flaw];
 }
@@ -147,17 +175,19 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
   } else {
     const std::size_t flaw = fit.freed[static_cast<std::size_t>(param - num_servo_params)];
     double& size = next.flaws.*servo_flaws[flaw];
-    if (flaw == ServoFlaw::earlier_command) {  // the response is linear in it
+    if (flaw == ServoFlaw::earlier_command || flaw == ServoFlaw::resonance_share) {  // the response is linear in it
       size += by * unit_of(fit, flaw);
       return next;
     }
-    by = std::clamp(by, -1.0, 1.0);
+    const double most = flaw == ServoFlaw::resonance ? 0.1 : 1.0;
+    by = std::clamp(by, -most, most);
     if (flaw == ServoFlaw::clock_rate)
       size = std::clamp(size + clock_unit * by, -max_clock_rate, max_clock_rate);
     else if (flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift)
       size = std::clamp(size + gain_unit * by, -max_gain_change, max_gain_change);
     else
       size *= std::exp(by);
+    if (flaw == ServoFlaw::resonance_damping) size = std::clamp(size, min_damping, max_damping);
     // Of two lags one is the shorter: the second.
     if (flaw == ServoFlaw::second_lag)
       size = std::clamp(size, 0.02 * next.params[ServoParam::tau], next.params[ServoParam::tau]);

@@ -119,9 +119,10 @@ std::string flaw_text(const ServoFit& fit, std::size_t flaw) {
 void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const std::vector<ServoCause> causes = servo_causes(log, identified);
-  Check check{.name = "causes",
-              .text = "neither limits, dead band, backlash, a second lag, a drift of clocks nor another gain show",
-              .unit = "σ"};
+  Check check{
+      .name = "causes",
+      .text = "neither limits, dead band, backlash, a second lag, a resonance, a drift of clocks nor another gain show",
+      .unit = "σ"};
   check.limit = 4.0;
   if (!fit.freed.empty()) {
     check.text = "estimated as well: ";

@@ -59,7 +59,9 @@ void count_clock_rate(double sigma_clock, ServoFit& fit) {
   fit.cov += moved * moved.transpose();
   for (const std::size_t flaw : fit.freed) {
     const bool is_of_time = flaw == ServoFlaw::rate_limit || flaw == ServoFlaw::second_lag;
-    const double power = flaw == ServoFlaw::acceleration_limit ? 2.0 : is_of_time ? 1.0 : 0.0;
+    const double power = flaw == ServoFlaw::acceleration_limit        ? 2.0
+                         : is_of_time || flaw == ServoFlaw::resonance ? 1.0
+                                                                      : 0.0;
     fit.flaw_sigma[flaw] = std::hypot(fit.flaw_sigma[flaw], power * sigma_clock * fit.flaws.*servo_flaws[flaw]);
   }
 }

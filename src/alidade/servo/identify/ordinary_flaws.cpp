@@ -1,4 +1,4 @@
-#include "alidade/servo/identify/ordinary_flaws.h"
+#include "alidade/servo/identify/identify_causes.h"
 
 #include <algorithm>
 #include <array>

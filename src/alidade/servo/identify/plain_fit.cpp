@@ -1,0 +1,101 @@
+#include "alidade/servo/identify/identify_flaws.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "alidade/geometry/decompositions.h"
+#include "alidade/servo/identify/levenberg.h"
+#include "alidade/servo/identify/sampled_log.h"
+
+namespace alidade {
+namespace {
+
+/// The response to commands of one sign: by it a gain that differs by the sign changes the response.
+Eigen::VectorXd rectified_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
+  std::vector<ServoSample> rows(log.begin(), log.end());
+  for (ServoSample& row : rows) row.command = std::abs(row.command);
+  return servo_response(rows, kind, params).J.col(ServoParam::gain);
+}
+
+LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s,
+                     const Eigen::VectorXd& readings, bool by_sign) {
+  ServoParams params;
+  params << 1.0, tau_s, latency_s, 0.0, 0.0;
+  const ServoResponse response = servo_response(log, kind, params);
+  Eigen::MatrixXd A(readings.size(), by_sign ? 4 : 3);  // the response is linear in these
+  A.leftCols<3>() << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero),
+      response.J.col(ServoParam::start);
+  if (by_sign) A.col(3) = rectified_response(log, kind, params);
+  const Eigen::VectorXd best = least_squares(A, readings);
+  LinearFit fit;
+  fit.params << best[0], tau_s, latency_s, best[1], best[2];
+  if (by_sign && best[0] != 0.0) fit.difference = best[3] / best[0];
+  fit.sum2 = (A * best - readings).squaredNorm();
+  return fit;
+}
+
+}  // namespace
+
+std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
+  constexpr std::size_t most = 1500;
+  const std::size_t stride = (log.size() + most - 1) / most;
+  std::vector<ServoSample> rows;
+  for (std::size_t i = 0; i < log.size(); ++i)
+    if (i % stride == 0 || log[i].command != log[i - 1].command) rows.push_back(log[i]);
+  return rows;
+}
+
+LinearFit searched(std::span<const ServoSample> log, ServoKind kind, bool by_sign) {
+  const std::vector<ServoSample> rows = thinned(log);
+  const Eigen::VectorXd readings = readings_of(rows);
+  const double duration_s = log.back().t_s - log.front().t_s;
+  const double step_s = duration_s / static_cast<double>(log.size() - 1);
+  std::vector<double> latencies{0.0};
+  for (double late_s = 0.5 * step_s; late_s < duration_s / 3.0; late_s *= 1.4) latencies.push_back(late_s);
+  LinearFit best;
+  for (double tau_s = 0.3 * step_s; tau_s < 3.0 * duration_s; tau_s *= 1.6) {
+    for (const double latency_s : latencies) {
+      const LinearFit fit = linear_fit(rows, kind, tau_s, latency_s, readings, by_sign);
+      if (fit.sum2 < best.sum2) best = fit;
+    }
+  }
+  return best;
+}
+
+std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J) {
+  const Eigen::MatrixXd JtJ = J.transpose() * J;
+  const Eigen::VectorXd scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * JtJ * scale.asDiagonal();
+  const Ldlt ldlt(scaled);
+  if (!(ldlt.min_pivot() > 1e-10)) return std::nullopt;
+  return scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
+}
+
+ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params) {
+  const Eigen::VectorXd readings = readings_of(log);
+  const double dof = static_cast<double>(readings.size()) - num_servo_params;
+  // 5 to 15 steps are typical; a kink at a sampled latency takes more
+  const LevenbergOutcome descent = levenberg(
+      {.max_steps = 60, .first_damping = 1e-6, .tolerance = 1e-12}, params,
+      [&](const ServoParams& at) -> Eigen::VectorXd { return servo_response(log, kind, at).angle_rad - readings; },
+      [&](const ServoParams& at) { return servo_response(log, kind, at).J; },
+      [](const ServoParams& from, const auto& step) { return within_meaning(from, ServoParams(from + step)); });
+  ServoFit fit;
+  fit.kind = kind;
+  fit.has_converged = descent.has_converged;
+  fit.params = params;
+  fit.rms_rad = std::sqrt(descent.sum2 / dof);
+  const auto inverse = inverse_normal(servo_response(log, kind, params).J);
+  fit.is_observable = inverse.has_value();
+  if (inverse) fit.cov = fit.cov_model = fit.rms_rad * fit.rms_rad * *inverse;
+  return fit;
+}
+
+double log_determinant(const Eigen::MatrixXd& A) {
+  const Eigen::VectorXd scale = A.diagonal().cwiseSqrt().cwiseMax(1e-300);
+  const Eigen::VectorXd down = scale.cwiseInverse();
+  const Eigen::VectorXd pivots = Eigen::LDLT<Eigen::MatrixXd>(down.asDiagonal() * A * down.asDiagonal()).vectorD();
+  return pivots.array().max(1e-300).log().sum() + 2.0 * scale.array().log().sum();
+}
+
+}  // namespace alidade

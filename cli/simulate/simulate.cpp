@@ -23,7 +23,7 @@ struct BoardArgs {
   Board board = no_board();
   std::string camera_file, model = "brown", size = "800x600";
   int photos = 20;
-  double max_tilt_deg = 35.0, bow_mm = 0.0, shape_sigma_mm = 0.0;
+  double max_tilt_deg = 35.0, bow_mm = 0.0, shape_sigma_mm = 0.0, autofocus = 0.0;
   double blur_px = 0.6, noise = 2.0, sigma_px = 0.1, shared_px = 0.0;
   bool corners_only = false;
 };
@@ -104,7 +104,8 @@ ExitCode simulate_board(const BoardArgs& args, Run& run) {
                                 .bow_m = 1e-3 * args.bow_mm,
                                 .shape_sigma_m = 1e-3 * args.shape_sigma_mm,
                                 .into_corners = true};
-  const BoardScene scene = draw_board_scene(camera_from(args, run), board, config, run.options.seed);
+  BoardScene scene = draw_board_scene(camera_from(args, run), board, config, run.options.seed);
+  scene.autofocus = args.autofocus;
   describe_truth(scene, run);
   std::vector<BoardView> views = simulate_views(scene, args.sigma_px, run.options.seed);
   if (args.shared_px > 0.0) add_shared_errors(scene, args.shared_px, run.options.seed + 1, views);
@@ -140,6 +141,11 @@ void add_board_scenario(App& app) {
   add_number(command, "--bow-mm", args->bow_mm, "Height of the board's centre over its corners", -1000.0, 1000.0);
   add_number(command, "--shape-sigma-mm", args->shape_sigma_mm, "Scatter of the board's points about their plan", 0.0,
              1000.0);
+  add_number(
+      command, "--autofocus", args->autofocus,
+      "An autofocus that is on: the focal length is longer by this share with the board at half a metre than far "
+      "away, where truth_camera.yaml has it",
+      -0.2, 0.2);
   add_number(command, "--blur", args->blur_px, "Sigma of the optical blur [px]", 0.0, 20.0);
   add_number(command, "--noise", args->noise, "Sigma of the grey noise, of 255", 0.0, 100.0);
   add_number(command, "--sigma-px", args->sigma_px, "Sigma of the corners in corners.csv", 0.0, 100.0);

@@ -70,8 +70,12 @@ LensChangeStudy find_change(std::span<const ViewScore> scores, const OrderTaken&
   for (std::size_t k = 0; !scores.empty() && k < taken.of_used.size(); ++k)
     in_order.push_back(scores[taken.of_used[k]]);
   LensChangeStudy study = lens_change(in_order, result);
-  if (study.change && !is_confirmed(*study.change, result.board, taken.views, result.config, result))
+  while (study.change && !is_confirmed(*study.change, result.board, taken.views, result.config, result)) {
     study.change.reset();
+    if (study.rivals.empty()) break;
+    study.change = std::move(study.rivals.front());
+    study.rivals.erase(study.rivals.begin());
+  }
   return study;
 }
 

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <random>
 #include <string_view>
+#include <utility>
 
 #include "alidade/calibrate/study.h"
 
@@ -19,12 +20,20 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t min_views = 6;
-constexpr std::string_view focal_length = "focal length";
+constexpr std::string_view focal_length = LensChange::focal_length;
 using Profile = LensChange::Profile;
-constexpr double care_sigmas = 2.0;
 /// Of a change of the focal length that is included in σ, though it may be chance (one clean set in 20 drifts, and one
 /// in 50 jumps somewhere): where it is proved the first photo is off by 5σ already.
-double included_from(Profile profile) { return profile == Profile::drift ? 2.0 : 3.5; }
+double included_from(Profile profile) {
+  switch (profile) {
+    case Profile::drift:
+      return 2.0;
+    case Profile::distance:  // which costs more where it is chance: far points are off by more than any photo
+      return 2.5;
+    default:
+      return 3.5;
+  }
+}
 
 /// What could change, as a direction in the lens parameters, and what each view says of it: its score γ, its
 /// information α and what of that the estimated parameters share, b, in units in which their information is 1.
@@ -32,7 +41,8 @@ struct Direction {
   std::string what;
   VectorXd of_lens;
   VectorXd score, information;
-  MatrixXd shared;  ///< A column a view.
+  MatrixXd shared;    ///< A column a view.
+  VectorXd nearness;  ///< Of the boards, 0 of the farthest and 1 of the nearest: 1/z over its range.
 };
 
 /// The views' part of the estimated parameters.
@@ -70,13 +80,17 @@ Direction direction_of(const std::string& what, VectorXd of_lens, std::span<cons
   const auto num_views = static_cast<Index>(views.size());
   Direction direction{what, std::move(of_lens), VectorXd(num_views), VectorXd(num_views),
                       MatrixXd(all.whiten.cols(), num_views)};
+  direction.nearness.resize(num_views);
   for (Index k = 0; k < num_views; ++k) {
     const ViewScore& view = views[static_cast<std::size_t>(k)];
+    direction.nearness[k] = 1.0 / view.depth_m;
     const VectorXd by_lens = view.information * direction.of_lens;
     direction.information[k] = direction.of_lens.dot(by_lens);
     direction.score[k] = direction.of_lens.dot(view.gradient) + by_lens(all.split.free).dot(all.to_optimum);
     direction.shared.col(k) = all.whiten.transpose() * by_lens(all.split.free);
   }
+  const double range = direction.nearness.maxCoeff() - direction.nearness.minCoeff();
+  direction.nearness = ((direction.nearness.array() - direction.nearness.minCoeff()) / range).eval();
   return direction;
 }
 
@@ -138,7 +152,7 @@ double drift_at(std::size_t place, std::size_t num_views) {
   return static_cast<double>(place) / static_cast<double>(num_views - 1);
 }
 
-/// The drift, or the jump that explains most, the views standing in that order.
+/// The drift, the course with the distance, or the jump that explains most, the views standing in that order.
 Found best_profile(const Direction& direction, Profile profile, const std::vector<Index>& order) {
   const std::size_t n = order.size(), least = least_beside(n), stride = 1 + n / 60;
   const Sums none{.shared = VectorXd::Zero(direction.shared.rows())};
@@ -146,10 +160,11 @@ Found best_profile(const Direction& direction, Profile profile, const std::vecto
   for (std::size_t i = 0; i < n; ++i) {
     total.add(direction, order[i], 1.0);
     if (profile == Profile::drift) sums.add(direction, order[i], drift_at(i, n));
+    if (profile == Profile::distance) sums.add(direction, order[i], direction.nearness[static_cast<Index>(i)]);
   }
   Found best{&direction, profile};
   if (!(total.information > 0.0)) return best;
-  if (profile == Profile::drift) best.chi2 = score_of(direction, sums, total).chi2();
+  if (profile != Profile::jump) best.chi2 = score_of(direction, sums, total).chi2();
   for (std::size_t i = n; profile == Profile::jump && i-- > least;) {
     sums.add(direction, order[i], 1.0);
     if (n - i < least || i % stride != 0) continue;
@@ -174,8 +189,8 @@ bool is_of_the_order(const Found& found, std::vector<Index> order) {
 
 /// The profiles' values, view by view, about their mean.
 VectorXd values_of(const Found& found, Index num_views) {
-  VectorXd t(num_views);
-  for (Index k = 0; k < num_views; ++k) {
+  VectorXd t = found.direction->nearness;
+  for (Index k = 0; found.profile != Profile::distance && k < num_views; ++k) {
     const auto place = static_cast<std::size_t>(k);
     t[k] = found.profile == Profile::drift ? drift_at(place, static_cast<std::size_t>(num_views))
                                            : (place >= found.at ? 1.0 : 0.0);
@@ -207,6 +222,7 @@ double information_of(const VectorXd& t, const Direction& direction) {
 /// length is what drifts most, and matters most.
 double proved_from(const Found& found) {
   if (found.profile == Profile::jump) return 4.0;
+  if (found.profile == Profile::distance) return 3.5;  // of what a lens or a board is otherwise, distances show much
   return found.direction->what == focal_length ? 3.1 : 3.5;
 }
 
@@ -235,6 +251,7 @@ LensChange change_of(const Found& found, const Estimated& all, const CalibrateRe
   change.size = -t.dot(direction.score) / information;
   change.sigma = std::max(report.noise_px / std::sqrt(information), sigma_of(t, found, all, change.size, information));
   change.mean_square = change.size * change.size * t.squaredNorm() / static_cast<double>(t.size());
+  change.course.assign(t.begin(), t.end());
   for (const Index at : all.split.free) {
     const double sigma = std::sqrt(report.camera.cov(at, at));
     const double moved = std::abs(change.size * direction.of_lens[at]) * t.cwiseAbs().maxCoeff();
@@ -243,31 +260,18 @@ LensChange change_of(const Found& found, const Estimated& all, const CalibrateRe
   return change;
 }
 
-std::string sized(const LensChange& change, double value) {
-  return change.what == focal_length ? text_of(100.0 * value, 2) : text_of(value, 2);
-}
+}  // namespace
 
-Check check_of(const LensChangeStudy& study, std::span<const std::string> photos) {
-  Check check{.name = "same lens", .limit = care_sigmas, .unit = "σ", .figure = "photos"};
-  if (!study.change && !study.seen_from) {
-    check.text = "too few photos determine the focal length to see whether it changes over them";
-    return check;
-  }
-  if (!study.change) {
-    check.text = "no change over the photos, in their order; the focal length is that of their mean, and a drift by " +
-                 text_of(100.0 * *study.seen_from, 2) + " % would be seen";
-    return check;
-  }
-  const LensChange& change = *study.change;
-  const bool drifts = change.profile == Profile::drift;
-  check.value = change.moves;
-  check.state = change.is_proved && change.moves > care_sigmas ? State::care : State::good;
-  check.text = change.what + (drifts ? " drifts by " : " jumps by ") + sized(change, change.size) + " ± " +
-               sized(change, 3.0 * change.sigma) + (change.what == focal_length ? " %" : " px") +
-               (drifts ? " from the first photo to the last" : " before " + photos[change.at]);
-  check.text += ": its mean is stated, and σ includes the change";
-  if (!change.is_proved) check.text = "not proved, but included in σ: " + check.text;
-  return check;
+namespace {
+
+/// What a course with the distance says of far points, whose lens is asked for most.
+void extend_to_far_points(std::span<const ViewScore> views, const Direction& direction, LensChange& change) {
+  const auto [nearest, farthest] = std::ranges::minmax(views, {}, &ViewScore::depth_m);
+  change.nearest_m = nearest.depth_m;
+  change.farthest_m = farthest.depth_m;
+  const double of_farthest = 1.0 / farthest.depth_m, range = 1.0 / nearest.depth_m - of_farthest;
+  const double mean = direction.nearness.dot(direction.information) / direction.information.sum();
+  change.mean_square = std::pow(change.size * (of_farthest / range + mean), 2);
 }
 
 }  // namespace
@@ -279,27 +283,37 @@ LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateRep
   const std::vector<Direction> directions = directions_of(views, report, *all);
   std::vector<Index> order(views.size());
   std::iota(order.begin(), order.end(), Index{0});
-  double largest = 0.0;
+  std::vector<std::pair<double, LensChange>> found_changes;  // by weight
   for (const Direction& direction : directions) {
-    for (const Profile profile : {Profile::drift, Profile::jump}) {
+    for (const Profile profile : {Profile::drift, Profile::jump, Profile::distance}) {
       const Found found = best_profile(direction, profile, order);
       if (!(found.chi2 > 0.0)) continue;
       LensChange change = change_of(found, *all, report);
       const bool is_focal = direction.what == focal_length;
+      if (profile == Profile::distance) {
+        if (!is_focal) continue;
+        extend_to_far_points(views, direction, change);
+      }
       if (is_focal && profile == Profile::drift) study.seen_from = size_seen(found, change.sigma);
+      if (profile == Profile::distance) study.seen_by_distance = size_seen(found, change.sigma);
       const double most = 0.05 * (is_focal ? 1.0 : report.camera.width_px);
       if (std::abs(change.size) > most) continue;  // no lens does: another camera, or what is not modelled
       const double sigmas = std::abs(change.size) / change.sigma;
       change.is_proved = sigmas > proved_from(found) && is_of_the_order(found, order);
-      constexpr double most_unproved = 0.01;  // what warming up or a creeping focus comes to
+      // What warming up or a creeping focus comes to, and what focusing does.
+      const double most_unproved = profile == Profile::distance ? most : 0.01;
       const bool is_included = is_focal && sigmas > included_from(profile) && std::abs(change.size) < most_unproved;
       // A proved one goes before one that is only included.
       const double weight = sigmas * (change.is_proved ? 100.0 : is_included ? 1.0 : 0.0);
-      if (weight > largest) {
-        largest = weight;
-        study.change = std::move(change);
-      }
+      if (weight > 0.0) found_changes.emplace_back(weight, std::move(change));
     }
+  }
+  std::ranges::stable_sort(found_changes, std::ranges::greater{}, [](const auto& found) { return found.first; });
+  for (auto& [weight, change] : found_changes) {
+    if (study.change)
+      study.rivals.push_back(std::move(change));
+    else
+      study.change = std::move(change);
   }
   return study;
 }
@@ -327,15 +341,27 @@ bool is_confirmed(const LensChange& change, const Board& board, std::span<const 
                   const CalibrateConfig& config, const CalibrateReport& report) {
   if (!is_central(report.camera.lens)) return true;
   const CalibrateConfig simple = with_distortion_fixed(config, report);
-  const bool jumps = change.profile == Profile::jump;
-  const std::size_t at = jumps ? change.at : used.size() / 2;
+  std::vector<std::size_t> order(used.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (change.profile == Profile::distance)
+    std::ranges::stable_sort(order, {}, [&](std::size_t k) { return change.course[k]; });
+  const std::size_t at = change.profile == Profile::jump ? change.at : used.size() / 2;
+  std::vector<BoardView> in_order;
+  double share_before = 0.0, share_after = 0.0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    in_order.push_back(used[order[i]]);
+    const bool is_before = i < at;
+    (is_before ? share_before : share_after) +=
+        change.course[order[i]] / static_cast<double>(is_before ? at : order.size() - at);
+  }
+  const std::span<const BoardView> views(in_order);
   const ImageSize size{report.camera.width_px, report.camera.height_px};
-  const CalibrateReport before = calibrate(board, used.first(at), size, simple, report.board_points),
-                        after = calibrate(board, used.subspan(at), size, simple, report.board_points);
+  const CalibrateReport before = calibrate(board, views.first(at), size, simple, report.board_points),
+                        after = calibrate(board, views.subspan(at), size, simple, report.board_points);
   if (before.status != CalibrateReport::Status::converged || after.status != before.status) return false;
   Index param = 0;
   change.direction.cwiseAbs().maxCoeff(&param);
-  const double share = change.direction[param] * (jumps ? 1.0 : 0.5), expected = share * change.size;
+  const double share = change.direction[param] * (share_after - share_before), expected = share * change.size;
   const double found = params(after.camera.lens)[param] - params(before.camera.lens)[param];
   const double variance =
       share * share * change.sigma * change.sigma + before.camera.cov(param, param) + after.camera.cov(param, param);
@@ -347,19 +373,6 @@ void count_change(const LensChange& change, CalibrateReport& report) {
   VectorXd direction = change.direction;
   for (const Index at : split_of(report).fixed) direction[at] = 0.0;
   report.camera.cov += change.mean_square * direction * direction.transpose();
-}
-
-void heed_change(const LensChangeStudy& study, std::span<const std::string> photos, Verdict& verdict) {
-  const Check check = check_of(study, photos);
-  const bool drifts = study.change && study.change->profile == Profile::drift;
-  const std::string remedy =
-      drifts ? "fix focus and zoom, let the camera warm up, and take the photos in the state in which it is used"
-             : "fix lens, focus and zoom, and calibrate the photos before and after it apart";
-  const bool was_good = verdict.state == State::good;
-  heed(check, remedy, verdict);
-  if (check.state != State::care || was_good) return;
-  verdict.sentence += "; " + check.text;  // which explains why photos disagree, and more of them would be no help
-  verdict.to_add = remedy;
 }
 
 }  // namespace alidade

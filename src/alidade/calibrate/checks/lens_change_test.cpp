@@ -116,6 +116,36 @@ TEST(LensChange, ABumpIsNamedWithItsPhoto) {
   EXPECT_THAT(result.verdict.to_add, HasSubstr("before and after it apart"));
 }
 
+std::vector<BoardView> focused_views(double autofocus, std::uint64_t seed) {
+  BoardScene scene = testing::covered_scene(sample_camera("brown"), photos_of_a_set, seed);
+  scene.autofocus = autofocus;
+  return testing::sample_views(scene, seed);
+}
+
+/// Named, and then within σ of far points' lens. (Of 1 % one set in twelve shows less than 2.5σ, and is silent.)
+TEST(LensChange, AnAutofocusIsNamedAndCountsFarPoints) {
+  const int draws = trials(4);
+  for (const double autofocus : {0.01, 0.02}) {
+    int named = 0, silent = 0;
+    for (int draw = 0; draw < draws; ++draw) {
+      const Calibration result = testing::sample_calibration(focused_views(autofocus, seed_of(draw)));
+      const std::string& said = result.verdict.sentence;
+      const bool is_named = said.find("focal length follows the board's distance") != std::string::npos;
+      const double off = sigmas_off(result, sample_camera("brown"));
+      named += is_named ? 1 : 0;
+      silent += result.verdict.state == State::good && off > 5.0 ? 1 : 0;
+      if (!is_named) continue;
+      EXPECT_LE(off, 5.0) << autofocus << " " << draw;
+      EXPECT_NE(result.verdict.state, State::good);
+    }
+    EXPECT_GE(named, draws - 1 - draws / 10) << autofocus << ": " << named << " of " << draws;
+    EXPECT_LE(silent, draws / 10) << autofocus << ": " << silent << " of " << draws;
+  }
+  const Calibration result = testing::sample_calibration(focused_views(0.02, 1));
+  EXPECT_EQ(check_named(result.verdict, "same lens").state, State::care);
+  EXPECT_THAT(result.verdict.to_add, HasSubstr("switch the autofocus off"));
+}
+
 TEST(LensChange, WhereTheOrderSaysNothingNothingIsNamed) {
   const int draws = trials(4);
   int named = 0;

@@ -26,13 +26,17 @@ std::vector<ViewScore> view_scores(const Board& board, CalibrateConfig config, s
   NormalEquations eq;
   if (!linearize(problem, state, eq)) return {};
   std::vector<ViewScore> scores;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : report.board_points)
+    middle += point / static_cast<double>(report.board_points.size());
   for (std::size_t k = 0; k < arrays.size(); ++k) {
     const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V[k]);
     if (V.info() != Eigen::Success) return {};
     const Eigen::MatrixXd follows = V.solve(eq.coupling(k).transpose());  // the pose does
     const auto of_view = eq.dense_of(k);
     scores.push_back({of_view.leftCols(eq.num_dense) - eq.coupling(k) * follows,
-                      of_view.col(eq.num_dense) - follows.transpose() * eq.pose_gradient[k]});
+                      of_view.col(eq.num_dense) - follows.transpose() * eq.pose_gradient[k],
+                      (state.cam_from_board[k] * middle).z()});
   }
   return scores;
 }

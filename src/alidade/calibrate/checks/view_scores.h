@@ -14,6 +14,7 @@ namespace alidade {
 struct ViewScore {
   Eigen::MatrixXd information;
   Eigen::VectorXd gradient;
+  double depth_m = 0.0;  ///< Of the board's middle, along the optical axis.
 };
 
 /// One for each view in use, in their order. Empty where the linearisation fails.

@@ -8,7 +8,6 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/pantilt/positioner.h"
 #include "alidade/pantilt/servo_plant.h"
-#include "alidade/servo/identify/decay.h"
 #include "alidade/servo/identify/levenberg.h"
 #include "alidade/servo/identify/sampled_log.h"
 

@@ -1,4 +1,3 @@
-#include "alidade/servo/identify/decay.h"
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/sampled_log.h"
 

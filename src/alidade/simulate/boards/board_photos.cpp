@@ -145,15 +145,36 @@ BoardScene draw_board_scene(const Camera& camera, const Board& board, const Boar
   return scene;
 }
 
+Camera camera_of(const BoardScene& scene, std::size_t i) {
+  if (scene.autofocus == 0.0) return scene.camera;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : scene.points_in_board)
+    middle += point / static_cast<double>(scene.points_in_board.size());
+  Camera camera = scene.camera;
+  Eigen::VectorXd lens = params(camera.lens);
+  lens.head<2>() *= 1.0 + scene.autofocus * 0.5 / (scene.cam_from_board[i] * middle).z();
+  camera.lens = with_params(camera.lens, lens);
+  return camera;
+}
+
 std::vector<Eigen::Vector2d> true_corners(const BoardScene& scene, std::size_t i) {
+  const Camera camera = camera_of(scene, i);
   std::vector<Eigen::Vector2d> corners;
   corners.reserve(scene.points_in_board.size());
   for (const Eigen::Vector3d& point : scene.points_in_board) {
-    const auto px = project(scene.camera, scene.cam_from_board[i] * point);
+    const auto px = project(camera, scene.cam_from_board[i] * point);
     corners.push_back(px ? *px : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
   }
   return corners;
 }
+
+namespace {
+
+bool is_outside(const Camera& camera, const Eigen::Vector2d& px) {
+  return !(px.minCoeff() >= 0.0 && px.x() <= camera.width_px - 1.0 && px.y() <= camera.height_px - 1.0);
+}
+
+}  // namespace
 
 std::vector<BoardView> simulate_views(const BoardScene& scene, double sigma_px, std::uint64_t seed) {
   Draws draws(seed);
@@ -163,7 +184,7 @@ std::vector<BoardView> simulate_views(const BoardScene& scene, double sigma_px, 
     BoardView view{photo_name(i), {}};
     for (std::size_t k = 0; k < truth.size(); ++k) {
       const Eigen::Vector2d noise = sigma_px * draws.normal2();
-      if (!truth[k].allFinite()) continue;
+      if (!truth[k].allFinite() || (scene.autofocus != 0.0 && is_outside(scene.camera, truth[k]))) continue;
       view.corners.push_back(
           {static_cast<int>(k), truth[k] + noise, sigma_px * sigma_px * Eigen::Matrix2d::Identity()});
     }

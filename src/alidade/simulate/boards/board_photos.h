@@ -20,7 +20,11 @@ struct BoardScene {
   Board board;
   std::vector<Eigen::Vector3d> points_in_board;  ///< True points [m]: flat, bowed, or free.
   std::vector<Rigid3> cam_from_board;            ///< One per photo.
+  double autofocus = 0.0;  ///< Relative growth of the focal length from far away to a board at half a metre: like 1/z.
 };
+
+/// The camera as it is in photo `i`.
+[[nodiscard]] Camera camera_of(const BoardScene& scene, std::size_t i);
 
 struct BoardSceneConfig {
   int num_photos = 20;

@@ -248,6 +248,38 @@ Check principal_point(const CalibrateReport& report) {
   return check;
 }
 
+/// Whether the printed side of a flat board is seen as if through it: z of the board points away from who sees it.
+Check from_the_front(const CalibrateReport& report, std::span<const BoardView> views) {
+  constexpr double flat = 0.1;  // of its largest coordinate; others may be seen from anywhere
+  double size = 0.0, height = 0.0;
+  for (const Eigen::Vector3d& point : report.board_points) {
+    size = std::max(size, point.head<2>().cwiseAbs().maxCoeff());
+    height = std::max(height, std::abs(point.z()));
+  }
+  std::size_t behind = 0, seen = 0;
+  std::string photo;
+  for (std::size_t i = 0; i < report.views.size(); ++i) {
+    const ViewFit& view = report.views[i];
+    if (!view.used || height > flat * size) continue;
+    ++seen;
+    if (view.cam_from_board.inverse().translation.z() > 0.0 && behind++ == 0) photo = views[i].photo;
+  }
+  Check check{.name = "mirrored", .unit = ""};
+  check.value = static_cast<double>(behind);
+  if (behind == 0) {
+    check.text = "boards are seen from the front";
+    return check;
+  }
+  check.state = State::care;
+  const std::string which = behind == seen ? "all boards are"
+                                           : std::to_string(behind) + " of " + std::to_string(seen) +
+                                                 " boards, the first in " + photo + ", are";
+  check.text = which +
+               " seen from behind: either their corners are numbered the other way, which does no harm, or the "
+               "images are mirrored, and cx and p2 with them";
+  return check;
+}
+
 /// Where another lens fits nearly as well: which. Only then is there anything to check.
 std::optional<Check> one_lens(const CalibrateReport& report) {
   constexpr double ruled_out = 0.01;
@@ -282,6 +314,7 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
     return check.name == "honest corners" && check.state == State::bad;
   });
   const std::string better_model = is_port ? "" : better_model_advice(study, config);
+  if (ails("mirrored")) return "give images as the camera takes them, and corners row by row from left to right";
   if (wrong_corners && better_model.empty()) return "look at the corners named, or extract them again";
   if (text_starts("board flat", "the board bends")) return "use --board-shape " + shape_name(study.transfer->shape);
   if (text_starts("board flat", "the board has another shape"))
@@ -314,6 +347,7 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
                     clusters_agree(report.clusters, "photo",
                                    "blur, rolling shutter, the lens model, or the board's shape", "clusters"),
                     honest_corners(report, views),
+                    from_the_front(report, views),
                     board_flat(study, config),
                     principal_point(report)};
   if (std::optional<Check> other = one_lens(report)) verdict.checks.push_back(std::move(*other));

@@ -38,7 +38,7 @@ TEST(CalibrationVerdict, CleanDataIsGood) {
     EXPECT_EQ(result.verdict.exit_code, ExitCode::ok);
     EXPECT_TRUE(result.verdict.to_add.empty()) << result.verdict.to_add;
     EXPECT_THAT(result.verdict.sentence, ::testing::StartsWith("Good: "));
-    EXPECT_EQ(result.verdict.checks.size(), 9u);
+    EXPECT_EQ(result.verdict.checks.size(), 10u);
     for (const Check& check : result.verdict.checks) EXPECT_EQ(check.state, State::good) << check.text;
   }
 }
@@ -128,6 +128,24 @@ TEST(CalibrationVerdict, ACornerIsHeldToItsOwnSigma) {
   corner.cov *= 64.0;  // blurred, and says so
   const Check blurred = check_named(sample_calibration(views).verdict, "honest corners");
   EXPECT_EQ(blurred.state, State::good) << blurred.text;
+}
+
+TEST(CalibrationVerdict, MirroredImagesAreNamed) {
+  std::vector<BoardView> views = sample_views(covered_scene(sample_camera("brown"), 20, 3), 3);
+  const auto mirror = [](BoardView& view) {
+    for (Corner& corner : view.corners) corner.px.x() = testing::sample_size.width_px - 1.0 - corner.px.x();
+  };
+  mirror(views[4]);
+  const Calibration one = sample_calibration(views);
+  EXPECT_EQ(check_named(one.verdict, "mirrored").state, State::care);
+  EXPECT_THAT(check_named(one.verdict, "mirrored").text, HasSubstr("1 of 20 boards, the first in " + views[4].photo));
+  EXPECT_THAT(one.verdict.to_add, HasSubstr("from left to right"));
+  mirror(views[4]);
+  EXPECT_EQ(check_named(sample_calibration(views).verdict, "mirrored").state, State::good);
+  std::ranges::for_each(views, mirror);
+  const Calibration all = sample_calibration(views);
+  EXPECT_EQ(all.verdict.state, State::care);
+  EXPECT_THAT(all.verdict.sentence, HasSubstr("all boards are seen from behind"));
 }
 
 TEST(CalibrationVerdict, CornersWorseThanTheirSigmaAreFlagged) {

@@ -20,7 +20,7 @@ constexpr int first_steps = 8, max_steps = 40;
 /// Begins the fit with one more flaw, from the two sizes that explain most; of a limit of rate also from one that
 /// hardly limits: a step beyond what is reached changes nothing, and does not come back.
 Candidate begun(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
-  const bool is_linear = flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift;
+  const bool is_linear = is_of_the_gain(flaw);
   const std::size_t max_starts = is_linear ? 1 : 2;
   const std::vector<FlawScore> scores = flaw_scores(log, fit, ground, flaw);
   Candidate best{flaw, fit};

@@ -268,7 +268,7 @@ Explained most_resonant(const Solution& as_logged, const Solution& believed, Ser
 /// like much else, and never where commands are of one size, which do not tell it from that.
 Solution with_resonance_tried(const Solution& as_logged, const Solution& believed, ServoKindRule rule) {
   constexpr std::size_t several = 2;
-  constexpr double margin = 12.0, clear = 10.0;
+  constexpr double margin = 12.0, clear = 10.0, beside_others = 40.0;
   if (num_sizes(as_logged.log, several) < several) return believed;
   const bool is_asked = asks_for_resonance(believed.log, believed.fit());
   if (!is_asked && (believed.is_plain() || !asks_for_resonance(as_logged.log, as_logged.fit()))) return believed;
@@ -280,7 +280,10 @@ Solution with_resonance_tried(const Solution& as_logged, const Solution& believe
     best.evidence =
         evidence_against(believed, found) + price_of_faults(found.log, believed) - price_of_faults(found.log, found);
   }
-  if (best.evidence > (believed.is_plain() ? margin : clear)) return found;
+  const double least = found.fit().freed.size() > num_of_a_resonance ? beside_others
+                       : believed.is_plain()                         ? margin
+                                                                     : clear;
+  if (best.evidence > least) return found;
   Solution result = believed;
   if (best.evidence > -clear && !believed.fit().freed.empty())
     result.rivals[result.believed].push_back(

@@ -181,10 +181,9 @@ TEST(ServoCauses, FlawsAreEstimated) {
   }
 }
 
-/// A log of an axis whose gain depends on the command's sign, or drifts: by the closed form of its plain plant, whose
-/// commands are changed as the gain is, in rows ten times as close.
-std::vector<ServoSample> log_of_gain(bool is_rate_plant, bool is_chirp, double difference, double drift,
-                                     std::uint64_t seed) {
+/// A log of an axis whose gain depends on the command's sign or size, or drifts: by the closed form of its plain plant,
+/// whose commands are changed as the gain is, in rows ten times as close.
+std::vector<ServoSample> log_of_gain(bool is_rate_plant, bool is_chirp, const ServoFlaws& flaws, std::uint64_t seed) {
   ServoLogScene scene = late_scene(is_rate_plant);
   scene.is_chirp = is_chirp;
   scene.duration_s = 8.0;
@@ -195,8 +194,9 @@ std::vector<ServoSample> log_of_gain(bool is_rate_plant, bool is_chirp, double d
     for (std::size_t k = 0; k < closer; ++k) {
       ServoSample row = log[i];
       row.t_s += static_cast<double>(k) / closer * (log[i + 1].t_s - row.t_s);
-      row.command *= 1.0 + std::copysign(difference, row.command);
-      row.command *= 1.0 + drift * ((row.t_s + 0.083 - log.front().t_s) / scene.duration_s - 0.5);
+      const double by_size = 1.0 + flaws.gain_by_size * (std::abs(row.command) / scene.amplitude - 0.5);
+      row.command *= by_size * (1.0 + std::copysign(flaws.gain_difference, row.command));
+      row.command *= 1.0 + flaws.gain_drift * ((row.t_s + 0.083 - log.front().t_s) / scene.duration_s - 0.5);
       fine.push_back(row);
     }
   ServoParams params;
@@ -210,20 +210,22 @@ std::vector<ServoSample> log_of_gain(bool is_rate_plant, bool is_chirp, double d
   return result;
 }
 
-/// 5 % between the directions, and over the log: both were taken for drifts of clocks, limits and dead bands, and a log
-/// of a rate plant for one that does not determine its gain.
+/// 5 % between the directions, over the log, and from small commands to large ones: they were taken for drifts of
+/// clocks, limits, dead bands and slips, and a log of a rate plant for one that does not determine its gain.
 TEST(ServoCauses, AGainThatIsNotOneIsEstimated) {
   const auto draws = static_cast<std::uint64_t>(testing::trials(4));
   int good = 0, runs = 0;
   double sum2 = 0.0;
-  for (const std::size_t flaw : {std::size_t{ServoFlaw::gain_difference}, std::size_t{ServoFlaw::gain_drift}}) {
+  for (const std::size_t flaw : {std::size_t{ServoFlaw::gain_difference}, std::size_t{ServoFlaw::gain_drift},
+                                 std::size_t{ServoFlaw::gain_by_size}}) {
     for (const bool is_rate_plant : {false, true}) {
       for (const bool is_chirp : {false, true}) {
-        for (std::uint64_t seed = 1; seed <= draws; ++seed, ++runs) {
+        const std::uint64_t last = flaw == ServoFlaw::gain_by_size ? (draws + 1) / 2 : draws;  // each takes a second
+        for (std::uint64_t seed = 1; seed <= last; ++seed, ++runs) {
           constexpr double size = 0.05;
-          const bool is_drift = flaw == ServoFlaw::gain_drift;
-          const std::vector<ServoSample> log =
-              log_of_gain(is_rate_plant, is_chirp, is_drift ? 0.0 : size, is_drift ? size : 0.0, seed);
+          ServoFlaws flaws;
+          flaws.*servo_flaws[flaw] = size;
+          const std::vector<ServoSample> log = log_of_gain(is_rate_plant, is_chirp, flaws, seed);
           const ServoIdentification identified = identify_servo(log);
           const ServoFit& fit = identified.fit;
           ASSERT_EQ(std::ranges::count(fit.freed, flaw), 1) << servo_flaw_words[flaw] << is_rate_plant << is_chirp;

@@ -21,13 +21,20 @@ constexpr double gain_unit = 0.05, max_gain_change = 0.9;  ///< Of a step of one
 constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one; beyond it nobody calls it a clock.
 constexpr double min_damping = 5e-3, max_damping = 0.9;    ///< Of what swings.
 
+double max_command(std::span<const ServoSample> log) {
+  double most = 0.0;
+  for (const ServoSample& row : log) most = std::max(most, std::abs(row.command));
+  return most;
+}
+
 /// A servo half-way through its log: an axis of gain and flaws as fitted, which counts its commands from zero.
 class FlawedServo {
  public:
-  FlawedServo(const ServoFit& fit, const ServoFlaws& flaws, double first_command)
+  FlawedServo(const ServoFit& fit, const ServoFlaws& flaws, double first_command, double max_command)
       : fit_(fit),
         flaws_(flaws),
         is_limited_(flaws.max_rate_rad_s > 0.0 || flaws.max_acceleration_rad_s2 > 0.0),
+        max_command_(max_command),
         decays_(fit.params[ServoParam::tau]),
         lagged_(goal_of(first_command, 0.0)) {
     const double max_rate = flaws.max_rate_rad_s > 0.0 ? flaws.max_rate_rad_s : no_limit;
@@ -80,7 +87,10 @@ class FlawedServo {
   /// The command that an axis of the stated gain would have to follow.
   [[nodiscard]] double goal_of(double command, double share) const {
     const double difference = command > 0.0 ? flaws_.gain_difference : -flaws_.gain_difference;
-    return past_dead_band(command, flaws_.dead_band) * (1.0 + difference) * (1.0 + flaws_.gain_drift * (share - 0.5));
+    double goal =
+        past_dead_band(command, flaws_.dead_band) * (1.0 + difference) * (1.0 + flaws_.gain_drift * (share - 0.5));
+    if (flaws_.gain_by_size != 0.0) goal *= 1.0 + flaws_.gain_by_size * (std::abs(command) / max_command_ - 0.5);
+    return goal;
   }
 
   /// As `advanced` without limits: the steps of a log have two lengths.
@@ -148,6 +158,7 @@ class FlawedServo {
   const ServoFit& fit_;
   const ServoFlaws& flaws_;
   bool is_limited_;
+  double max_command_;
   Decay decays_;
   ServoAxis axis_;
   AxisMotion now_;
@@ -159,7 +170,7 @@ class FlawedServo {
 double unit_of(const ServoFit& fit, std::size_t flaw) {
   constexpr double turn_rad = 0.1;
   if (flaw == ServoFlaw::clock_rate) return clock_unit;
-  if (flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift) return gain_unit;
+  if (is_of_the_gain(flaw)) return gain_unit;
   if (flaw == ServoFlaw::resonance_share) return 1.0;
   if (flaw == ServoFlaw::earlier_command) return turn_rad / std::max(std::abs(fit.params[ServoParam::gain]), 1e-300);
   return fit.flaws.*servo_flaws[flaw];
@@ -182,7 +193,7 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
     by = std::clamp(by, -most, most);
     if (flaw == ServoFlaw::clock_rate)
       size = std::clamp(size + clock_unit * by, -max_clock_rate, max_clock_rate);
-    else if (flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift)
+    else if (is_of_the_gain(flaw))
       size = std::clamp(size + gain_unit * by, -max_gain_change, max_gain_change);
     else
       size *= std::exp(by);
@@ -230,12 +241,6 @@ Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const Serv
   return J;
 }
 
-double max_command(std::span<const ServoSample> log) {
-  double most = 0.0;
-  for (const ServoSample& row : log) most = std::max(most, std::abs(row.command));
-  return most;
-}
-
 double max_rate(std::span<const ServoSample> log, const Eigen::VectorXd& response) {
   const std::vector<double> times_s = reading_times(log);
   double most = 0.0;
@@ -267,7 +272,8 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
     case ServoFlaw::earlier_command:
       return times(max_command(log), {-1.0, 1.0});
     case ServoFlaw::gain_difference:
-    case ServoFlaw::gain_drift:  // the response is nearly linear in them
+    case ServoFlaw::gain_drift:
+    case ServoFlaw::gain_by_size:  // the response is nearly linear in them
       return times(gain_unit, {-1.0, 1.0});
     default:
       return times(fit.params[ServoParam::tau], {0.1, 0.3, 0.6, 1.0});
@@ -281,7 +287,7 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
   const double begin_s = std::min(log.front().t_s, times_s.front());
   Eigen::VectorXd angles(static_cast<Index>(times_s.size()));
   double now_s = begin_s, command = log.front().command + flaws.earlier_command;
-  FlawedServo servo(fit, flaws, command);
+  FlawedServo servo(fit, flaws, command, flaws.gain_by_size != 0.0 ? std::max(max_command(log), 1e-300) : 1.0);
   const double length_s = std::max(times_s.back() - begin_s, 1e-9);
   const auto advance_to = [&](double until_s) {
     servo.advance(until_s - now_s, command, (0.5 * (now_s + until_s) - begin_s) / length_s);

@@ -21,6 +21,7 @@ struct ServoFlaw {
     earlier_command,
     gain_difference,
     gain_drift,
+    gain_by_size,
     resonance,  ///< Its frequency; the next two go with it.
     resonance_damping,
     resonance_share
@@ -49,6 +50,13 @@ struct LinearFit {
 
 /// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
 [[nodiscard]] ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params);
+
+inline constexpr std::size_t num_of_a_resonance = 3;
+
+/// Of the gain, in parts of it: the response is nearly linear in them.
+[[nodiscard]] constexpr bool is_of_the_gain(std::size_t flaw) {
+  return flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift || flaw == ServoFlaw::gain_by_size;
+}
 
 /// The log's, not the axis'.
 [[nodiscard]] constexpr bool is_of_the_log(std::size_t flaw) {

@@ -14,9 +14,17 @@ namespace {
 
 using Status = RigReport::Status;
 
+constexpr double usual_rad = 0.3 * degree;  // more is worse than any encoder
+
+/// Of a hypothesis that is of interest only if σ of a reading is below this: the right one settles in a few iterations,
+/// a wrong one has no minimum to reach.
+Effort effort_below(double sigma_rad) {
+  constexpr double margin = 1.5;
+  return {.iterations = 20, .unsettled_rounds = 2, .max_sigma_rad = margin * sigma_rad};
+}
+
 /// What a wrong camera looks like: encoders worse than any encoder, views that contradict each other.
 bool is_suspicious(const RigReport& report) {
-  constexpr double usual_rad = 0.3 * degree;
   if (report.status == Status::mirrored) return false;
   if (report.status != Status::converged)
     return report.status == Status::no_convergence || report.status == Status::degenerate;
@@ -66,9 +74,10 @@ std::vector<Misreading> misreadings(std::span<const HeadView> given) {
   return all;
 }
 
+constexpr double far = 2.0, as_good = 1.2;  // of σ of a reading
+
 /// Whether a change of the table makes its views agree far better: in their readings, or in that none is rejected.
 bool is_far_better(const RigReport& otherwise, const RigReport& given) {
-  constexpr double far = 2.0, as_good = 1.2;
   if (otherwise.status != Status::converged || otherwise.views_dropped > given.views_dropped) return false;
   const double ratio = otherwise.sigma_encoder_rad / given.sigma_encoder_rad;
   return (otherwise.sigma_encoder_is_estimated && ratio < 1.0 / far) ||
@@ -88,10 +97,11 @@ void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen:
                          (report.sigma_encoder_is_estimated && report.sigma_encoder_rad > uneasy_rad);
   if (report.status == Status::degrees || report.status == Status::mirrored || views.size() < min_views) return;
   if (!is_bad && !is_uneasy) return;
+  const Effort effort = effort_below(is_bad ? usual_rad : as_good * report.sigma_encoder_rad);
   std::optional<RigReport> best;
   for (const Misreading& other : misreadings(views)) {
     if (!is_bad && !other.is_exchange) continue;
-    const RigReport otherwise = calibrated_with(other.views, points_in_board, cameras, config, {}, progress);
+    const RigReport otherwise = calibrated_with(other.views, points_in_board, cameras, config, {}, progress, effort);
     if (otherwise.status != Status::converged || is_suspicious(otherwise)) continue;
     if (!is_bad && !is_far_better(otherwise, report)) continue;
     if (best && std::pair(otherwise.views_dropped, otherwise.sigma_encoder_rad) >=
@@ -106,15 +116,19 @@ void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen:
   report.misreading_remedy = "give each view what its own pan and tilt encoders read";
 }
 
-/// The boards whose views' readings are corrected by more than others', or of which two views or more are rejected.
+/// The boards whose views' readings are corrected by more than others', or of which two views or more are rejected:
+/// all but a few of those that are, as two poses of a board explain its own views only.
 std::set<int> odd_boards(std::span<const HeadView> views, const RigReport& report) {
   constexpr double min_ratio = 2.0;
+  constexpr int few = 10;                            // one in so many; in the end one in twenty
   std::map<int, std::pair<double, double>> squares;  // and how many
   std::map<int, int> rejected;
   double sum = 0.0, num = 0.0;
+  int all_rejected = 0;
   for (std::size_t v = 0; v < views.size() && v < report.views.size(); ++v) {
     if (!report.views[v].used) {
       ++rejected[views[v].board];
+      ++all_rejected;
       continue;
     }
     const double square = report.views[v].reading_correction_rad.squaredNorm();
@@ -127,7 +141,7 @@ std::set<int> odd_boards(std::span<const HeadView> views, const RigReport& repor
   for (const auto& [board, of] : squares)
     if (of.first * num > min_ratio * sum * of.second) odd.insert(board);
   for (const auto& [board, num_rejected] : rejected)
-    if (num_rejected > 1) odd.insert(board);
+    if (num_rejected > 1 && few * (all_rejected - num_rejected) <= static_cast<int>(views.size())) odd.insert(board);
   return odd;
 }
 
@@ -140,6 +154,7 @@ void look_for_moved_board(std::span<const HeadView> views, std::span<const Eigen
   constexpr std::size_t min_views = 2;
   int unused = 0;
   for (const HeadView& view : views) unused = std::max(unused, view.board + 1);
+  const Effort effort = effort_below((report.views_dropped > 1 ? as_good : 1.0 / far) * report.sigma_encoder_rad);
   RigReport best = report;
   std::string words;
   for (const int board : odd_boards(views, report)) {
@@ -149,7 +164,7 @@ void look_for_moved_board(std::span<const HeadView> views, std::span<const Eigen
     for (std::size_t first = min_views; first + min_views <= own.size(); ++first) {
       std::vector<HeadView> moved(views.begin(), views.end());
       for (std::size_t k = first; k < own.size(); ++k) moved[own[k]].board = unused;
-      const RigReport otherwise = calibrated_with(moved, points_in_board, cameras, config, {}, progress);
+      const RigReport otherwise = calibrated_with(moved, points_in_board, cameras, config, {}, progress, effort);
       if (!is_far_better(otherwise, report) || otherwise.views_dropped > best.views_dropped ||
           (otherwise.views_dropped == best.views_dropped && otherwise.sigma_encoder_rad > best.sigma_encoder_rad))
         continue;
@@ -175,7 +190,8 @@ RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::
   if (cameras.size() == 2 && is_suspicious(report)) {
     std::map<int, Camera> swapped = cameras;
     std::swap(swapped.begin()->second, swapped.rbegin()->second);
-    const RigReport otherwise = calibrated_with(views, points_in_board, swapped, config, {}, progress);
+    const RigReport otherwise =
+        calibrated_with(views, points_in_board, swapped, config, {}, progress, effort_below(usual_rad));
     if (otherwise.status == Status::converged && !is_suspicious(otherwise)) report.status = Status::swapped;
   }
   const bool is_alone = report.status == Status::converged || report.status == Status::no_convergence ||

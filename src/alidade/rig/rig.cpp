@@ -73,16 +73,19 @@ std::vector<double> hard_weights(const Work& work, RigState& state, const std::v
 
 /// Soft weights until the views have settled, then those that disagree rejected.
 std::optional<SolvedRig> solve_robustly(Work& work, const RigState& start, std::vector<double>& weights) {
-  constexpr int rounds = 6, max_iterations = 40;
+  constexpr int rounds = 6;
+  const Effort& effort = work.effort;
+  int unsettled = 0;
   std::optional<SolvedRig> solved;
   RigState state = start;
   for (int round = 0; round < rounds; ++round) {
     report_progress(work.progress, "solve", static_cast<std::size_t>(round), rounds + 2);
     weights = soft_weights(work, state);
-    solved = solve_rig(work.problem, state, weights, max_iterations);
+    solved = solve_rig(work.problem, state, weights, effort.iterations);
     if (!solved) return std::nullopt;
     work.report.iterations += solved->iterations;
     state = solved->state;
+    if (!solved->converged && ++unsettled >= effort.unsettled_rounds) return std::nullopt;
     if (solved->converged && solved->iterations <= 2) break;
   }
   for (int round = 0; round < 3; ++round) {
@@ -90,10 +93,11 @@ std::optional<SolvedRig> solve_robustly(Work& work, const RigState& start, std::
     const bool is_settled = round > 0 && next == weights;
     weights = next;
     if (is_settled) break;
-    solved = solve_rig(work.problem, state, weights, max_iterations);
+    solved = solve_rig(work.problem, state, weights, effort.iterations);
     if (!solved) return std::nullopt;
     work.report.iterations += solved->iterations;
     state = solved->state;
+    if (!solved->converged && ++unsettled >= effort.unsettled_rounds) return std::nullopt;
   }
   return solved;
 }
@@ -121,6 +125,7 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
     work.num_given = freedom >= enough ? freedom : 0.0;
     const double before = work.problem.sigma_encoder_rad;
     double sigma_rad = std::max(min_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / freedom));
+    if (sigma_rad > work.effort.max_sigma_rad) return std::nullopt;
     if (!(freedom >= enough)) {
       work.report.sigma_encoder_is_estimated = false;
       sigma_rad = freedom > 1.0 ? std::max(sigma_rad, usual_rad) : usual_rad;
@@ -371,8 +376,9 @@ void calibrate(Work& work, const std::map<int, Camera>& cameras) {
 
 RigReport calibrated_with(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                           const std::map<int, Camera>& cameras, const RigConfig& config, const FreedParams& freed,
-                          const Progress& progress) {
+                          const Progress& progress, const Effort& effort) {
   Work work{views, config, progress, freed, {}, {}, {}, {}, {}, {}, {}};
+  work.effort = effort;
   work.problem.points_in_board = points_in_board;
   calibrate(work, cameras);
   return std::move(work.report);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -118,10 +119,13 @@ class ByNeed {
   /// None where the views do not determine it.
   std::optional<RigReport> solve(const FreedParams& freed) {
     constexpr double worst_rad = 2.0 * degree, worst_m = 0.05;
+    if (undetermined_.contains(freed)) return std::nullopt;
     RigReport trial = calibrated_with(views_, points_, cameras_, config_, freed, progress_);
     const bool is_given = trial.status == Status::converged && trial.sigma_relative_rad < worst_rad &&
                           trial.sigma_relative_m < worst_m && trial.views_used >= best_.views_used;
-    return is_given ? std::optional(std::move(trial)) : std::nullopt;
+    if (is_given) return trial;
+    undetermined_.insert(freed);  // nor later: the views used never become fewer
+    return std::nullopt;
   }
 
   std::vector<Candidate> asked() const {
@@ -221,6 +225,7 @@ class ByNeed {
   RigConfig config_;
   const Progress& progress_;
   FreedParams freed_;
+  std::set<FreedParams> undetermined_;
   RigReport best_;
   bool sigma_px_is_estimated_ = false;
   std::string alike_;

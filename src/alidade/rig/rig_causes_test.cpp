@@ -154,6 +154,31 @@ TEST(RigTable, AnglesOfTheViewBeforeOfOneHeadAreNamed) {
                });
 }
 
+/// How often a solve's rounds were begun.
+int num_rounds(const std::vector<HeadView>& views, const RigScene& scene) {
+  int rounds = 0;
+  const Progress count = [&rounds](std::string_view what, std::size_t, std::size_t) {
+    rounds += what == "solve" ? 1 : 0;
+    return true;
+  };
+  (void)calibrate_rig(views, points_in_board(scene.board), testing::cameras_of(scene.rig), {}, count);
+  return rounds;
+}
+
+/// A view in five has its corners from the other end: no reading of the table, and no move of a board, explains these.
+TEST(RigTable, ViewsThatContradictEachOtherAreNotTriedForLong) {
+  RigSceneConfig config;
+  config.num_boards = 10;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const RigScene scene = draw_rig_scene(config, seed);
+    std::vector<HeadView> views = simulate_head_views(scene, {}, seed).views;
+    const int clean = num_rounds(views, scene);
+    for (std::size_t v = 0; v < views.size(); v += 5)
+      for (Corner& corner : views[v].seen.corners) corner.index = 53 - corner.index;
+    EXPECT_LT(num_rounds(views, scene), 10 * clean) << seed << ": " << clean;
+  }
+}
+
 /// Lenses bend by a k1 of −0.015 that their files, a pinhole's, do not have: a pixel at the image's corners.
 TEST(RigTable, DistortionThatALensDoesNotHaveIsNamed) {
   RigSceneConfig config;

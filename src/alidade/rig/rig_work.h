@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -16,6 +17,13 @@ namespace alidade {
 /// Everything on the way: what is estimated, and what the views are.
 using FreedParams = std::map<int, std::vector<int>>;  ///< By id of the head: parameters beside what is always free.
 
+/// How long a solve is tried. A hypothesis is given up once it cannot be the one that is looked for.
+struct Effort {
+  int iterations = 40;                                             ///< Of each round.
+  int unsettled_rounds = 99;                                       ///< So many rounds that do not converge end it.
+  double max_sigma_rad = std::numeric_limits<double>::infinity();  ///< So does an estimated σ of a reading beyond it.
+};
+
 struct Work {
   std::span<const HeadView> given;
   const RigConfig& config;
@@ -28,13 +36,14 @@ struct Work {
   std::vector<bool> usable;
   RigReport report;
   double num_given = 0.0;  ///< Degrees of freedom by which σ of a reading was estimated; 0: given.
+  Effort effort = {};
 };
 
 /// calibrate_rig() with these parameters estimated too.
 [[nodiscard]] RigReport calibrated_with(std::span<const HeadView> views,
                                         std::span<const Eigen::Vector3d> points_in_board,
                                         const std::map<int, Camera>& cameras, const RigConfig& config,
-                                        const FreedParams& freed, const Progress& progress);
+                                        const FreedParams& freed, const Progress& progress, const Effort& effort = {});
 /// Causes indicated by the report's residuals, estimated too, one after another, as long as the views determine them.
 [[nodiscard]] RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
                                       std::span<const Eigen::Vector3d> points_in_board,

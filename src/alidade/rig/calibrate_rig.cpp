@@ -36,7 +36,8 @@ bool is_suspicious(const RigReport& report) {
 struct Misreading {
   std::string words;
   std::vector<HeadView> views;
-  bool is_exchange = false;
+  bool is_common = false;  ///< Tried where only a few views are rejected, too.
+  std::string remedy = "give each view what its own pan and tilt encoders read";
 };
 
 /// Each view of a head, or of all, with the angles of the one before, or after.
@@ -50,13 +51,31 @@ std::vector<HeadView> shifted(std::span<const HeadView> given, std::optional<int
   return views;
 }
 
+/// The corners of a head counted from the other end of the board: its boards seem to stand upside down.
+Misreading turned_corners(std::span<const HeadView> given, int head, int than, int last) {
+  Misreading turned{"the corners of head " + std::to_string(head) +
+                        " are numbered from the other end of the board than those of head " + std::to_string(than) +
+                        ": the views agree with them counted backwards",
+                    std::vector<HeadView>(given.begin(), given.end()), true,
+                    "number the corners of all heads from the same end of the board (of head " + std::to_string(head) +
+                        ": " + std::to_string(last) + " - corner)"};
+  for (HeadView& view : turned.views)
+    if (view.head == head)
+      for (Corner& corner : view.seen.corners) corner.index = last - corner.index;
+  return turned;
+}
+
 /// Of all heads, then of each.
-std::vector<Misreading> misreadings(std::span<const HeadView> given) {
+std::vector<Misreading> misreadings(std::span<const HeadView> given, std::span<const Eigen::Vector3d> points_in_board) {
   std::set<int> ids;
   for (const HeadView& view : given) ids.insert(view.head);
   std::vector<std::optional<int>> heads{std::nullopt};
   if (ids.size() > 1) heads.insert(heads.end(), ids.begin(), ids.end());
   std::vector<Misreading> all;
+  if (half_turn_of(points_in_board))
+    for (const int id : ids)
+      if (id != *ids.begin())
+        all.push_back(turned_corners(given, id, *ids.begin(), static_cast<int>(points_in_board.size()) - 1));
   for (const std::optional<int> head : heads) {
     const std::string of = head ? " of head " + std::to_string(*head) : "";
     std::vector<HeadView> exchanged(given.begin(), given.end());
@@ -86,7 +105,7 @@ bool is_far_better(const RigReport& otherwise, const RigReport& given) {
 }
 
 /// Why views that contradict each other may do so: as they are read otherwise, they agree. Of views of which a few were
-/// rejected, or whose readings scatter, only whether pan and tilt are exchanged.
+/// rejected, or whose readings scatter, only whether pan and tilt are exchanged, or corners counted backwards.
 void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                          const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress,
                          RigReport& report) {
@@ -99,8 +118,8 @@ void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen:
   if (!is_bad && !is_uneasy) return;
   const Effort effort = effort_below(is_bad ? usual_rad : as_good * report.sigma_encoder_rad);
   std::optional<RigReport> best;
-  for (const Misreading& other : misreadings(views)) {
-    if (!is_bad && !other.is_exchange) continue;
+  for (const Misreading& other : misreadings(views, points_in_board)) {
+    if (!is_bad && !other.is_common) continue;
     const RigReport otherwise = calibrated_with(other.views, points_in_board, cameras, config, {}, progress, effort);
     if (otherwise.status != Status::converged || is_suspicious(otherwise)) continue;
     if (!is_bad && !is_far_better(otherwise, report)) continue;
@@ -109,11 +128,12 @@ void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen:
       continue;
     best = otherwise;
     best->misreading = other.words;
+    best->misreading_remedy = other.remedy;
   }
   if (!best) return;
   report.status = Status::misread;
   report.misreading = best->misreading;
-  report.misreading_remedy = "give each view what its own pan and tilt encoders read";
+  report.misreading_remedy = best->misreading_remedy;
 }
 
 /// The boards whose views' readings are corrected by more than others', or of which two views or more are rejected:

@@ -45,6 +45,7 @@ inline constexpr double good_span_rad = 0.35;
 struct HeadCover {
   int id = 0;
   int num_views = 0, num_boards = 0;
+  int num_used = 0;  ///< Of these views; the others were rejected.
   Eigen::Vector2d lowest_rad = Eigen::Vector2d::Zero(), highest_rad = Eigen::Vector2d::Zero();  ///< Pan, tilt.
   int num_shared_boards = 0;  ///< Seen by another head, too.
 };

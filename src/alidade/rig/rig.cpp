@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/rig/rig_causes.h"
@@ -143,15 +144,20 @@ std::string reason_of(const Work& work, const RigState& state, std::size_t v) {
   const RigView& view = work.problem.views[v];
   if (!work.poses[v]) return "outlier: its pixels do not fit";
   const Rigid3& cam_from_board = work.poses[v]->pose.cam_from_board;
-  const auto off = [&](std::size_t head) {
+  const auto off = [&](std::size_t head, const Rigid3& seen) {
     const Rigid3 expected =
         cam_from_world(state.heads[head].head, work.given[v].pan_tilt_rad) * state.world_from_board[view.board];
-    return std::pair{expected.rotation.angularDistance(cam_from_board.rotation),
-                     (expected.translation - cam_from_board.translation).norm()};
+    return std::pair{expected.rotation.angularDistance(seen.rotation),
+                     (expected.translation - seen.translation).norm()};
   };
-  const auto [angle_rad, length_m] = off(view.head);
+  const auto [angle_rad, length_m] = off(view.head, cam_from_board);
+  if (const auto turn = half_turn_of(work.problem.points_in_board); turn && angle_rad > 0.5 * std::numbers::pi) {
+    const auto [turned_rad, turned_m] = off(view.head, cam_from_board * *turn);
+    if (turned_rad < 2.0 * degree && turned_m < 0.05)
+      return "outlier: its corners are numbered from the other end of the board";
+  }
   for (std::size_t h = 0; h < state.heads.size(); ++h) {
-    const auto [other_rad, other_m] = off(h);
+    const auto [other_rad, other_m] = off(h, cam_from_board);
     if (h != view.head && other_rad < 2.0 * degree && other_m < 0.05 && angle_rad + length_m > 0.1)
       return "outlier: it fits head " + std::to_string(work.ids[h]) + "; heads swapped?";
   }
@@ -168,6 +174,7 @@ void describe_views(Work& work, const SolvedRig& solved, const std::vector<doubl
     fit.used = weights[v] > 0.0;
     if (!fit.used && fit.reason.empty()) fit.reason = reason_of(work, solved.state, v);
     (fit.used ? work.report.views_used : work.report.views_dropped) += 1;
+    if (fit.used) ++work.report.covers[work.problem.views[v].head].num_used;
     const auto at = view_residuals(work.problem, solved.state, v);
     if (!at) continue;
     fit.chi2 = at->r.squaredNorm();

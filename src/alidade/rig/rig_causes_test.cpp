@@ -62,6 +62,7 @@ INSTANTIATE_TEST_SUITE_P(
         RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},
         RigFault{"flipped_pan", [](RigTrialSetup& s) { s.mistake.flip_pan = true; }},
         RigFault{"mirrored", [](RigTrialSetup& s) { s.mistake.mirror = true; }},
+        RigFault{"turned_corners", [](RigTrialSetup& s) { s.mistake.turn_corners = true; }},
         RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
     [](const auto& info) { return std::string(info.param.name); });
 
@@ -177,6 +178,40 @@ TEST(RigTable, ViewsThatContradictEachOtherAreNotTriedForLong) {
       for (Corner& corner : views[v].seen.corners) corner.index = 53 - corner.index;
     EXPECT_LT(num_rounds(views, scene), 10 * clean) << seed << ": " << clean;
   }
+}
+
+TEST(RigTable, CornersFromTheOtherEndOfTheBoardAreNamed) {
+  const auto turn = [](const RigScene& scene, std::uint64_t, std::vector<HeadView>& views) {
+    views = mistaken_views(std::move(views), scene, {.turn_corners = true});
+  };
+  for (const int num_boards : {3, 5, 8})
+    expect_named("the corners of head 2 are numbered from the other end of the board than those of head 1", turn,
+                 {.num_boards = num_boards});
+}
+
+TEST(RigTable, AHeadMostOfWhoseViewsAreRejectedIsNoResult) {
+  const RigScene scene = draw_rig_scene({}, 1);
+  RigReport report = calibrate_rig(simulate_head_views(scene, {}, 1).views, points_in_board(scene.board),
+                                   testing::cameras_of(scene.rig), {});
+  ASSERT_EQ(report.status, RigReport::Status::converged);
+  ASSERT_EQ(report.covers[1].num_used, report.covers[1].num_views);
+  // As if most of the second head's: fewer than 40 % of all.
+  int left = report.covers[1].num_views * 6 / 10;
+  for (auto view = report.views.rbegin(); left > 0; ++view, --left) view->used = false;
+  report.covers[1].num_used -= report.covers[1].num_views * 6 / 10;
+  const Verdict verdict = rig_verdict(report, {});
+  EXPECT_EQ(verdict.exit_code, ExitCode::no_convergence);
+  EXPECT_NE(verdict.sentence.find("of head 2"), std::string::npos) << verdict.sentence;
+}
+
+/// A single view so is named.
+TEST(RigTable, AViewWithItsCornersFromTheOtherEndIsNamed) {
+  const RigScene scene = draw_rig_scene({}, 1);
+  std::vector<HeadView> views = simulate_head_views(scene, {}, 1).views;
+  for (Corner& corner : views[7].seen.corners) corner.index = 53 - corner.index;
+  const RigReport report = calibrate_rig(views, points_in_board(scene.board), testing::cameras_of(scene.rig), {});
+  ASSERT_EQ(report.status, RigReport::Status::converged);
+  EXPECT_EQ(report.views[7].reason, "outlier: its corners are numbered from the other end of the board");
 }
 
 /// Lenses bend by a k1 of −0.015 that their files, a pinhole's, do not have: a pixel at the image's corners.

@@ -151,6 +151,16 @@ std::optional<int> mirrored_head(const Work& work) {
   return std::nullopt;
 }
 
+std::optional<Rigid3> half_turn_of(std::span<const Eigen::Vector3d> points_in_board) {
+  if (points_in_board.size() < 3) return std::nullopt;
+  const Eigen::Vector3d twice_centre = points_in_board.front() + points_in_board.back();
+  for (std::size_t i = 0; i < points_in_board.size(); ++i) {
+    const Eigen::Vector3d sum = points_in_board[i] + points_in_board[points_in_board.size() - 1 - i];
+    if (points_in_board[i].z() != 0.0 || !((sum - twice_centre).norm() < 1e-9)) return std::nullopt;
+  }
+  return Rigid3{Eigen::Quaterniond(0.0, 0.0, 0.0, 1.0), twice_centre};
+}
+
 bool start_mountings(Work& work) {
   constexpr double suspicious_rad = 3.0 * degree;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {

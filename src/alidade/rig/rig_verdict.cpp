@@ -166,8 +166,14 @@ void add_fit(const RigReport& report, Verdict& verdict) {
     named += (named.empty() ? "" : ", ") + std::to_string(v + 1);
     ++outliers;
   }
+  const auto lost =
+      std::ranges::find_if(report.covers, [](const HeadCover& cover) { return 2 * cover.num_used < cover.num_views; });
+  const bool is_lost = lost != report.covers.end();
+  if (is_lost)
+    named += "; these are " + std::to_string(lost->num_views - lost->num_used) + " of the " +
+             std::to_string(lost->num_views) + " of head " + std::to_string(lost->id);
   const auto given = static_cast<double>(report.views.size());
-  const State state = outliers == 0 ? State::good : outliers > 0.4 * given ? State::refused : State::care;
+  const State state = outliers == 0 ? State::good : is_lost || outliers > 0.4 * given ? State::refused : State::care;
   verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all views agree" : "rejected: view " + named,
                                     outliers, 0.4 * given, ""));
   if (report.dof < 1) return;

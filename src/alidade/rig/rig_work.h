@@ -57,6 +57,9 @@ void fit_poses(Work& work);
 /// The id of a head that sees the printed side of flat boards from behind in most of its views: its images are
 /// mirrored.
 [[nodiscard]] std::optional<int> mirrored_head(const Work& work);
+/// By which a board's points come to stand in reverse order, the last where the first was: half a turn about its
+/// centre. None: it has no such symmetry.
+[[nodiscard]] std::optional<Rigid3> half_turn_of(std::span<const Eigen::Vector3d> points_in_board);
 /// Mountings of all heads; false where the readings are degrees.
 [[nodiscard]] bool start_mountings(Work& work);
 /// Which parameters are estimated.

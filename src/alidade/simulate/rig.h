@@ -56,13 +56,14 @@ struct SimulatedViews {
 
 /// What a user got wrong, or did not know, about such a world.
 struct RigMistake {
-  double focal = 0.0;        ///< Share by which the camera files' focal lengths are too long.
-  double centre_px = 0.0;    ///< By which their centres lie aside, in u and in v.
-  bool swap_angles = false;  ///< Pan is in the column of tilt.
-  bool flip_pan = false;     ///< Pan counts the other way.
-  bool mirror = false;       ///< Images are mirrored.
-  bool swap_heads = false;   ///< The heads' numbers are exchanged.
-  bool shift_rows = false;   ///< Each view has the angles of the one before.
+  double focal = 0.0;         ///< Share by which the camera files' focal lengths are too long.
+  double centre_px = 0.0;     ///< By which their centres lie aside, in u and in v.
+  bool swap_angles = false;   ///< Pan is in the column of tilt.
+  bool flip_pan = false;      ///< Pan counts the other way.
+  bool mirror = false;        ///< Images are mirrored.
+  bool swap_heads = false;    ///< The heads' numbers are exchanged.
+  bool shift_rows = false;    ///< Each view has the angles of the one before.
+  bool turn_corners = false;  ///< The second head's corners are numbered from the other end of the board.
 };
 [[nodiscard]] std::vector<HeadView> mistaken_views(std::vector<HeadView> views, const RigScene& scene,
                                                    const RigMistake& mistake);

@@ -117,6 +117,8 @@ TEST(RangefinderScale, IsEstimatedWithBoardsAndRefusedWithSpotsAlone) {
     if (config.method == Method::joint) {
       EXPECT_NEAR(report.beam.scale, 1.02, 0.005);
     }
+    for (const Assumption& assumption : rangefinder_assumptions(report))
+      EXPECT_EQ(assumption.remedy.find("--scale"), std::string::npos) << assumption.name;
     config.method = Method::spot;
     const RangefinderReport alone = solve_sample(sample, config);
     EXPECT_TRUE(alone.status == Status::scale_unknown);

@@ -19,7 +19,9 @@ double ordinary_error(const FixedQuantity& thing) {
   return 0.2 * thing.value;  // a σ
 }
 
-const char* remedy_of(const std::string& name) {
+const char* remedy_of(const RangefinderReport& report, const std::string& name) {
+  const bool scale_is_free = std::ranges::count(report.fixed, "scale", &FixedQuantity::name) == 0;
+  if (name == "square_m" && scale_is_free) return "measure the squares and give --sigma-square";
   if (name == "square_m")
     return "measure the squares and give --sigma-square, or estimate the readings' scale: --scale";
   if (name == "scale") return "give --sigma-scale, or estimate it: --scale";
@@ -57,7 +59,7 @@ bool is_of_lengths(const FixedQuantity& thing) { return thing.name == "scale" ||
 Assumption assumption_of(const RangefinderReport& report, const FixedQuantity& thing) {
   Assumption assumption{.name = thing.name, .value = thing.value, .sigma = thing.sigma};
   if (!thing.sigma) assumption.ordinary = ordinary_error(thing);
-  assumption.remedy = thing.sigma ? "" : remedy_of(thing.name);
+  assumption.remedy = thing.sigma ? "" : remedy_of(report, thing.name);
   put_moves(report, thing.sigma.value_or(assumption.ordinary) * thing.moves, assumption);
   return assumption;
 }

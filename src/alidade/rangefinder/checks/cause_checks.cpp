@@ -77,6 +77,7 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.5, foreign = 0.02;
   Check check =
       check_of("camera", State::good, "boards and spots agree with the camera file", 0.0, ask_beyond, "σ", "residuals");
+  const bool may_bend = std::ranges::count(report.fixed, "board.flat_m", &FixedQuantity::name) > 0;
   for (const FixedQuantity& thing : report.fixed) {
     if (!thing.name.starts_with("camera")) continue;
     const double z = std::abs(thing.asked) / thing.asked_sigma;
@@ -87,7 +88,8 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
     const bool is_focal = thing.name == "camera.f";
     check.text = "the shots indicate " + asked_of_lens(thing) + " (" + text_of(z, 2) + "σ): " +
                  (is_focal && std::abs(thing.asked) > foreign * thing.value ? "the file of another camera, or zoomed"
-                                                                            : "calibrate the camera again");
+                                                                            : "calibrate the camera again") +
+                 (may_bend ? "; a board that is not flat looks alike" : "");
   }
   verdict.checks.push_back(std::move(check));
 }

@@ -78,9 +78,12 @@ std::optional<Estimated> estimated_of(std::span<const ViewScore> views, const Ca
 Direction direction_of(const std::string& what, VectorXd of_lens, std::span<const ViewScore> views,
                        const Estimated& all) {
   const auto num_views = static_cast<Index>(views.size());
-  Direction direction{what, std::move(of_lens), VectorXd(num_views), VectorXd(num_views),
-                      MatrixXd(all.whiten.cols(), num_views)};
-  direction.nearness.resize(num_views);
+  Direction direction{what,
+                      std::move(of_lens),
+                      VectorXd(num_views),
+                      VectorXd(num_views),
+                      MatrixXd(all.whiten.cols(), num_views),
+                      VectorXd(num_views)};
   for (Index k = 0; k < num_views; ++k) {
     const ViewScore& view = views[static_cast<std::size_t>(k)];
     direction.nearness[k] = 1.0 / view.depth_m;

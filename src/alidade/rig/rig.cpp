@@ -336,7 +336,8 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
   take_backlash(work, state, given.wide, cov_wide + given.cov);
   work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
   take_assumed(work.report, given, world.J);
-  work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed, work.num_given);
+  work.report.causes =
+      rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed, given.cov_lenses, work.num_given);
   work.report.deviance =
       solved.system.cost + 4.0 * static_cast<double>(work.report.views_used) * std::log(work.report.sigma_encoder_rad);
   for (std::size_t b = 0; b < work.boards.size(); ++b) {

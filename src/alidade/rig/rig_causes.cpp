@@ -119,34 +119,54 @@ MatrixXd tested_columns(const RigProblem& problem, const RigState& state, std::s
 struct Score {
   VectorXd s;
   MatrixXd I;
+  MatrixXd by_lenses;  ///< Of it with the parameters of all heads' lenses.
 };
+
+Index num_lens_params(const RigState& state, std::size_t head) { return params(state.heads[head].camera.lens).size(); }
+
+Index first_lens_param(const RigState& state, std::size_t head) {
+  Index first = 0;
+  for (std::size_t h = 0; h < head; ++h) first += num_lens_params(state, h);
+  return first;
+}
 
 Score score_of(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
                const std::vector<double>& weights) {
   const auto num = tested_a_head * static_cast<Index>(solved.state.heads.size());
-  Score score{VectorXd::Zero(num), MatrixXd::Zero(num, num)};
-  MatrixXd by_common = MatrixXd::Zero(cov.rows(), num);
-  std::vector<MatrixXd> by_board(solved.state.world_from_board.size(), MatrixXd::Zero(6, num));
+  const Index num_lenses = first_lens_param(solved.state, solved.state.heads.size());
+  Score score{VectorXd::Zero(num), MatrixXd::Zero(num, num), MatrixXd::Zero(num, num_lenses)};
+  // Beside what is tested the lenses, to whose errors the score responds.
+  MatrixXd by_common = MatrixXd::Zero(cov.rows(), num + num_lenses);
+  std::vector<MatrixXd> by_board(solved.state.world_from_board.size(), MatrixXd::Zero(6, num + num_lenses));
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     if (!(weights[v] > 0.0)) continue;
     const auto at = view_residuals(problem, solved.state, v);
     const auto equations = view_equations(problem, solved, v);
     if (!at || !equations) continue;
-    const MatrixXd D = tested_columns(problem, solved.state, v);
+    const MatrixXd D = tested_columns(problem, solved.state, v), lens = given_columns(problem, solved.state, v).lens;
     const Index first = tested_a_head * static_cast<Index>(problem.views[v].head);
     const MatrixXd by_correction = at->J_correction.transpose() * D;
     const Eigen::Matrix2d E = at->J_correction.transpose() * at->J_correction;
     score.s.segment(first, tested_a_head) += D.transpose() * at->r;
     score.I.block(first, first, tested_a_head, tested_a_head) +=
         D.transpose() * D - by_correction.transpose() * (E.inverse() * by_correction);
-    const MatrixXd by_pose = equations->Q.transpose() * D;
-    by_common.middleCols(first, tested_a_head) += equations->G.transpose() * by_pose;
-    by_board[problem.views[v].board].middleCols(first, tested_a_head) += equations->K_board.transpose() * by_pose;
+    const Index first_lens = first_lens_param(solved.state, problem.views[v].head);
+    score.by_lenses.block(first, first_lens, tested_a_head, lens.cols()) +=
+        D.transpose() * lens - by_correction.transpose() * (E.inverse() * (at->J_correction.transpose() * lens));
+    const auto add_pose = [&](Index column, const MatrixXd& columns) {
+      const MatrixXd by_pose = equations->Q.transpose() * columns;
+      by_common.middleCols(column, columns.cols()) += equations->G.transpose() * by_pose;
+      by_board[problem.views[v].board].middleCols(column, columns.cols()) += equations->K_board.transpose() * by_pose;
+    };
+    add_pose(first, D);
+    add_pose(num + first_lens, lens);
   }
+  MatrixXd followed = by_common.leftCols(num).transpose() * cov * by_common;
   for (std::size_t b = 0; b < by_board.size(); ++b)
     if (!solved.system.boards[b].V.isZero(0.0))
-      score.I -= by_board[b].transpose() * Ldlt(solved.system.boards[b].V).solve_each(by_board[b]);
-  score.I -= by_common.transpose() * cov * by_common;
+      followed += by_board[b].leftCols(num).transpose() * Ldlt(solved.system.boards[b].V).solve_each(by_board[b]);
+  score.I -= followed.leftCols(num);
+  score.by_lenses -= followed.rightCols(num_lenses);
   return score;
 }
 
@@ -171,19 +191,24 @@ VectorXd given_sigmas(const std::vector<Assumption>& assumed, const Tested& test
 
 std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
                                  const std::vector<double>& weights, const std::vector<Assumption>& assumed,
-                                 double num_given) {
+                                 const MatrixXd& cov_lenses, double num_given) {
   const Score score = score_of(problem, solved, cov, weights);
   std::vector<RigCause> causes;
   for (const Tested& tested : tested_of(problem, solved.state)) {
     const VectorXd s = score.s(tested.places);
     const VectorXd given = given_sigmas(assumed, tested);
     const SymmetricEigen eigen = symmetric_eigen(MatrixXd(score.I(tested.places, tested.places)));
+    const MatrixXd by_lenses = score.by_lenses(tested.places, Eigen::all);
+    const bool is_of_lens = tested.name.ends_with("camera.k1");
     double chi2 = 0.0, num = 0.0;
     VectorXd size = VectorXd::Zero(s.size());
     for (Index k = 0; k < s.size(); ++k) {
       if (!(eigen.values[k] * tested.worst * tested.worst > 1.0)) continue;
       const double along = eigen.vectors.col(k).dot(s) / eigen.values[k];
-      chi2 += along * along / (1.0 / eigen.values[k] + eigen.vectors.col(k).cwiseProduct(given).squaredNorm());
+      const VectorXd moved = by_lenses.transpose() * eigen.vectors.col(k) / eigen.values[k];  // by errors of the files
+      const double of_files = is_of_lens ? moved.dot(cov_lenses * moved) : 0.0;
+      chi2 +=
+          along * along / (1.0 / eigen.values[k] + eigen.vectors.col(k).cwiseProduct(given).squaredNorm() + of_files);
       num += 1.0;
       size -= along * eigen.vectors.col(k);
     }

@@ -24,4 +24,18 @@ inline ServoLogScene late_scene(bool is_rate_plant, RatePlant plant = {0.005, An
   return scene;
 }
 
+/// 2.5 s of it, and a fit as a response is asked of, with τ 0.1 s, latency 83 ms and zero 0.2 rad.
+struct LogAndFit {
+  std::vector<ServoSample> log;
+  ServoFit fit;
+};
+inline LogAndFit short_log_and_fit(bool is_rate_plant) {
+  ServoLogScene scene = late_scene(is_rate_plant);
+  scene.duration_s = 2.5;
+  LogAndFit sample{log_of(scene, 1), {}};
+  sample.fit.kind = is_rate_plant ? ServoKind::rate : ServoKind::angle;
+  sample.fit.params << gain_of(scene.axis.plant), 0.1, 0.083, 0.2, 0.0;
+  return sample;
+}
+
 }  // namespace alidade::testing

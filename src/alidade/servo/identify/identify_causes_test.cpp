@@ -29,12 +29,7 @@ TEST(ServoCauses, WithoutFlawsIsTheClosedForm) {
 /// A plant with every flaw, stepped through in 10 µs by its differential equations.
 TEST(ServoCauses, FlawedResponseIsTheIntegralOfItsEquations) {
   for (const bool is_rate_plant : {false, true}) {
-    ServoLogScene scene = late_scene(is_rate_plant);
-    scene.duration_s = 2.5;
-    const std::vector<ServoSample> log = log_of(scene, 1);
-    ServoFit fit;
-    fit.kind = is_rate_plant ? ServoKind::rate : ServoKind::angle;
-    fit.params << gain_of(scene.axis.plant), 0.1, 0.083, 0.2, 0.0;
+    const auto [log, fit] = testing::short_log_and_fit(is_rate_plant);
     ServoFlaws flaws{.max_rate_rad_s = is_rate_plant ? 0.6 : 1.2, .dead_band = 8.0, .backlash_rad = 0.01};
     for (const int more : {0, 1, 2, 3}) {
       if (more == 1) flaws.second_tau_s = 0.03;

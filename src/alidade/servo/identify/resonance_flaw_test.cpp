@@ -19,12 +19,7 @@ using testing::log_of;
 /// A drive and what swings behind it, stepped through in 10 µs by their differential equations.
 TEST(ServoResonance, ResponseIsTheIntegralOfItsEquations) {
   for (const bool is_rate_plant : {false, true}) {
-    ServoLogScene scene = late_scene(is_rate_plant);
-    scene.duration_s = 2.5;
-    const std::vector<ServoSample> log = log_of(scene, 1);
-    ServoFit fit;
-    fit.kind = is_rate_plant ? ServoKind::rate : ServoKind::angle;
-    fit.params << gain_of(scene.axis.plant), 0.1, 0.083, 0.2, 0.0;
+    const auto [log, fit] = testing::short_log_and_fit(is_rate_plant);
     const ServoFlaws flaws{.resonance_hz = 4.0, .resonance_damping = 0.07, .resonance_share = 0.8};
     const Eigen::VectorXd angles = flawed_response(log, fit, flaws);
     constexpr double dt_s = 1e-5, omega = 2.0 * std::numbers::pi * 4.0;

@@ -151,6 +151,8 @@ void add_rig_scenario(App& app) {
   command.add_flag("--mirror", args->mistake.mirror, "Images are mirrored");
   command.add_flag("--swap-heads", args->mistake.swap_heads, "The heads' numbers are exchanged");
   command.add_flag("--shift-rows", args->mistake.shift_rows, "Each view has the angles of the one before");
+  add_number(command, "--pan-read", args->mistake.pan_read,
+             "What the second head's pan column has of its true angles (0.5: half)", 0.1, 10.0);
   command.add_flag("--turn-corners", args->mistake.turn_corners,
                    "The second head's corners are numbered from the other end of the board");
   command.add_flag("--photos", args->photos, "Render the photos instead of corners");

@@ -7,6 +7,7 @@
 
 #include "alidade/estimation/verdict.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/rig/checks/misreadings.h"
 #include "alidade/rig/rig_work.h"
 
 namespace alidade {
@@ -32,67 +33,6 @@ bool is_suspicious(const RigReport& report) {
          5 * report.views_dropped > report.views_used;
 }
 
-/// Another reading of the same table, by which its views may agree.
-struct Misreading {
-  std::string words;
-  std::vector<HeadView> views;
-  bool is_common = false;  ///< Tried where only a few views are rejected, too.
-  std::string remedy = "give each view what its own pan and tilt encoders read";
-};
-
-/// Each view of a head, or of all, with the angles of the one before, or after.
-std::vector<HeadView> shifted(std::span<const HeadView> given, std::optional<int> head, bool is_late) {
-  std::vector<HeadView> views(given.begin(), given.end());
-  std::vector<std::size_t> own;
-  for (std::size_t v = 0; v < given.size(); ++v)
-    if (!head || given[v].head == *head) own.push_back(v);
-  for (std::size_t k = 0; k < own.size(); ++k)
-    views[own[k]].pan_tilt_rad = given[own[(k + (is_late ? 1 : own.size() - 1)) % own.size()]].pan_tilt_rad;
-  return views;
-}
-
-/// The corners of a head counted from the other end of the board: its boards seem to stand upside down.
-Misreading turned_corners(std::span<const HeadView> given, int head, int than, int last) {
-  Misreading turned{"the corners of head " + std::to_string(head) +
-                        " are numbered from the other end of the board than those of head " + std::to_string(than) +
-                        ": the views agree with them counted backwards",
-                    std::vector<HeadView>(given.begin(), given.end()), true,
-                    "number the corners of all heads from the same end of the board (of head " + std::to_string(head) +
-                        ": " + std::to_string(last) + " - corner)"};
-  for (HeadView& view : turned.views)
-    if (view.head == head)
-      for (Corner& corner : view.seen.corners) corner.index = last - corner.index;
-  return turned;
-}
-
-/// Of all heads, then of each.
-std::vector<Misreading> misreadings(std::span<const HeadView> given, std::span<const Eigen::Vector3d> points_in_board) {
-  std::set<int> ids;
-  for (const HeadView& view : given) ids.insert(view.head);
-  std::vector<std::optional<int>> heads{std::nullopt};
-  if (ids.size() > 1) heads.insert(heads.end(), ids.begin(), ids.end());
-  std::vector<Misreading> all;
-  if (half_turn_of(points_in_board))
-    for (const int id : ids)
-      if (id != *ids.begin())
-        all.push_back(turned_corners(given, id, *ids.begin(), static_cast<int>(points_in_board.size()) - 1));
-  for (const std::optional<int> head : heads) {
-    const std::string of = head ? " of head " + std::to_string(*head) : "";
-    std::vector<HeadView> exchanged(given.begin(), given.end());
-    for (HeadView& view : exchanged)
-      if (!head || view.head == *head) view.pan_tilt_rad.reverseInPlace();
-    all.push_back({"pan and tilt" + of + " are exchanged: the views agree with each in the other's column",
-                   std::move(exchanged), true});
-    all.push_back(
-        {"the angles" + of + " are those of the view before: the views agree with each row's angles one row earlier",
-         shifted(given, head, true)});
-    all.push_back(
-        {"the angles" + of + " are those of the view after: the views agree with each row's angles one row later",
-         shifted(given, head, false)});
-  }
-  return all;
-}
-
 constexpr double far = 2.0, as_good = 1.2;  // of σ of a reading
 
 /// Whether a change of the table makes its views agree far better: in their readings, or in that none is rejected.
@@ -104,36 +44,74 @@ bool is_far_better(const RigReport& otherwise, const RigReport& given) {
           ratio < as_good);
 }
 
+constexpr std::size_t min_views = 8;  // of a table that is read otherwise
+
+/// A report that says how its table was misread.
+RigReport misread(RigReport report, const Misreading& how) {
+  report.status = Status::misread;
+  report.misreading = how.words;
+  report.misreading_remedy = how.remedy;
+  return report;
+}
+
+/// Of those by which the views agree, the one by which the fewest are rejected, and then the best.
+class BestMisreading {
+ public:
+  explicit BestMisreading(const Work& table, const std::map<int, Camera>& cameras, const Effort& effort)
+      : table_(table), cameras_(cameras), effort_(effort) {}
+
+  /// `is_better`: what it must be, beside a rig that explains its views.
+  template <class IsBetter>
+  void try_one(const Misreading& other, const IsBetter& is_better) {
+    const RigReport otherwise = calibrated_with(other.views, table_.problem.points_in_board, cameras_, table_.config,
+                                                {}, table_.progress, effort_);
+    if (otherwise.status != Status::converged || is_suspicious(otherwise) || !is_better(otherwise)) return;
+    const std::pair left{otherwise.views_dropped, otherwise.sigma_encoder_rad};
+    if (best_ && left >= least_) return;
+    least_ = left;
+    best_ = other;
+  }
+
+  [[nodiscard]] const std::optional<Misreading>& best() const { return best_; }
+
+ private:
+  const Work& table_;
+  const std::map<int, Camera>& cameras_;
+  Effort effort_;
+  std::optional<Misreading> best_;
+  std::pair<int, double> least_;
+};
+
+/// Rotations of the boards that contradict each other, and agree once the angles are read otherwise: before anything is
+/// solved with angles that cannot be.
+std::optional<RigReport> misread_by_rotations(const Work& table, const std::map<int, Camera>& cameras) {
+  constexpr std::size_t most_tried = 3;
+  if (table.given.size() < min_views || mirrored_head(table) ||
+      !(rotation_misfit_rad(table, readings_of(table.given)) > suspicious_misfit_rad))
+    return std::nullopt;
+  std::vector<Misreading> others = misreadings(table);
+  std::erase_if(others, [](const Misreading& other) { return !(other.misfit_left.value_or(1.0) < clear_misfit); });
+  std::ranges::stable_sort(others, {}, &Misreading::misfit_left);
+  BestMisreading tried(table, cameras, effort_below(usual_rad));
+  for (std::size_t k = 0; k < std::min(most_tried, others.size()); ++k)
+    tried.try_one(others[k], [](const RigReport&) { return true; });
+  if (!tried.best()) return std::nullopt;
+  return misread(table.report, *tried.best());
+}
+
 /// Why views that contradict each other may do so: as they are read otherwise, they agree. Of views of which a few were
-/// rejected, or whose readings scatter, only whether pan and tilt are exchanged, or corners counted backwards.
-void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
-                         const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress,
-                         RigReport& report) {
-  constexpr std::size_t min_views = 8;
+/// rejected, or whose readings scatter, only what is common.
+void look_for_misreading(const Work& table, const std::map<int, Camera>& cameras, RigReport& report) {
   constexpr double uneasy_rad = 0.05 * degree;
   const bool is_bad = is_suspicious(report);
   const bool is_uneasy = 20 * report.views_dropped > report.views_used ||
                          (report.sigma_encoder_is_estimated && report.sigma_encoder_rad > uneasy_rad);
-  if (report.status == Status::degrees || report.status == Status::mirrored || views.size() < min_views) return;
-  if (!is_bad && !is_uneasy) return;
-  const Effort effort = effort_below(is_bad ? usual_rad : as_good * report.sigma_encoder_rad);
-  std::optional<RigReport> best;
-  for (const Misreading& other : misreadings(views, points_in_board)) {
-    if (!is_bad && !other.is_common) continue;
-    const RigReport otherwise = calibrated_with(other.views, points_in_board, cameras, config, {}, progress, effort);
-    if (otherwise.status != Status::converged || is_suspicious(otherwise)) continue;
-    if (!is_bad && !is_far_better(otherwise, report)) continue;
-    if (best && std::pair(otherwise.views_dropped, otherwise.sigma_encoder_rad) >=
-                    std::pair(best->views_dropped, best->sigma_encoder_rad))
-      continue;
-    best = otherwise;
-    best->misreading = other.words;
-    best->misreading_remedy = other.remedy;
-  }
-  if (!best) return;
-  report.status = Status::misread;
-  report.misreading = best->misreading;
-  report.misreading_remedy = best->misreading_remedy;
+  if (table.given.size() < min_views || (!is_bad && !is_uneasy)) return;
+  BestMisreading tried(table, cameras, effort_below(is_bad ? usual_rad : as_good * report.sigma_encoder_rad));
+  for (const Misreading& other : misreadings(table))
+    if (is_bad || other.is_common)
+      tried.try_one(other, [&](const RigReport& otherwise) { return is_bad || is_far_better(otherwise, report); });
+  if (tried.best()) report = misread(std::move(report), *tried.best());
 }
 
 /// The boards whose views' readings are corrected by more than others', or of which two views or more are rejected:
@@ -206,17 +184,20 @@ void look_for_moved_board(std::span<const HeadView> views, std::span<const Eigen
 
 RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                         const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress) {
-  RigReport report = calibrated_with(views, points_in_board, cameras, config, {}, progress);
+  const FreedParams nothing;
+  const Work table = prepared_work(views, points_in_board, cameras, config, nothing, progress);
+  if (auto misread = misread_by_rotations(table, cameras)) return std::move(*misread);
+  RigReport report = calibrated_with(views, points_in_board, cameras, config, nothing, progress);
   if (cameras.size() == 2 && is_suspicious(report)) {
     std::map<int, Camera> swapped = cameras;
     std::swap(swapped.begin()->second, swapped.rbegin()->second);
     const RigReport otherwise =
-        calibrated_with(views, points_in_board, swapped, config, {}, progress, effort_below(usual_rad));
+        calibrated_with(views, points_in_board, swapped, config, nothing, progress, effort_below(usual_rad));
     if (otherwise.status == Status::converged && !is_suspicious(otherwise)) report.status = Status::swapped;
   }
   const bool is_alone = report.status == Status::converged || report.status == Status::no_convergence ||
                         report.status == Status::degenerate;
-  if (is_alone) look_for_misreading(views, points_in_board, cameras, config, progress, report);
+  if (is_alone) look_for_misreading(table, cameras, report);
   if (report.status == Status::converged)
     look_for_moved_board(views, points_in_board, cameras, config, progress, report);
   return report;

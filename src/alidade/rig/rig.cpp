@@ -197,30 +197,6 @@ void describe_views(Work& work, const SolvedRig& solved, const std::vector<doubl
   work.report.dof = solved.system.num_residuals - work.problem.num_free() - 6 * num_boards;
 }
 
-void count_cover(Work& work) {
-  for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    HeadCover cover{.id = work.ids[h]};
-    std::map<std::size_t, int> seen_boards;
-    for (std::size_t v = 0; v < work.given.size(); ++v) {
-      if (!work.usable[v] || work.problem.views[v].head != h) continue;
-      const Eigen::Vector2d& angles = work.given[v].pan_tilt_rad;
-      cover.lowest_rad = cover.num_views == 0 ? angles : Eigen::Vector2d(cover.lowest_rad.cwiseMin(angles));
-      cover.highest_rad = cover.num_views == 0 ? angles : Eigen::Vector2d(cover.highest_rad.cwiseMax(angles));
-      ++cover.num_views;
-      ++seen_boards[work.problem.views[v].board];
-    }
-    cover.num_boards = static_cast<int>(seen_boards.size());
-    for (const auto& [board, count] : seen_boards) {
-      const bool is_shared = std::ranges::any_of(work.problem.views, [&, board = board](const RigView& view) {
-        return view.board == board && view.head != h &&
-               work.usable[static_cast<std::size_t>(&view - work.problem.views.data())];
-      });
-      cover.num_shared_boards += is_shared ? 1 : 0;
-    }
-    work.report.covers.push_back(cover);
-  }
-}
-
 bool has_enough(const Work& work) {
   if (work.heads.empty()) return false;
   return std::ranges::all_of(work.report.covers, [](const HeadCover& cover) { return cover.num_views >= 3; });
@@ -348,10 +324,7 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
   work.report.status = solved.converged ? Status::converged : Status::no_convergence;
 }
 
-void calibrate(Work& work, const std::map<int, Camera>& cameras) {
-  index_views(work, cameras);
-  fit_poses(work);
-  count_cover(work);
+void calibrate(Work& work) {
   if (!has_enough(work)) return;
   if (const auto head = mirrored_head(work)) {
     work.report.status = Status::mirrored;
@@ -385,10 +358,9 @@ void calibrate(Work& work, const std::map<int, Camera>& cameras) {
 RigReport calibrated_with(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                           const std::map<int, Camera>& cameras, const RigConfig& config, const FreedParams& freed,
                           const Progress& progress, const Effort& effort) {
-  Work work{views, config, progress, freed, {}, {}, {}, {}, {}, {}, {}};
+  Work work = prepared_work(views, points_in_board, cameras, config, freed, progress);
   work.effort = effort;
-  work.problem.points_in_board = points_in_board;
-  calibrate(work, cameras);
+  calibrate(work);
   return std::move(work.report);
 }
 

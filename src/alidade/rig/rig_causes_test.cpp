@@ -64,6 +64,8 @@ INSTANTIATE_TEST_SUITE_P(
         RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},
         RigFault{"flipped_pan", [](RigTrialSetup& s) { s.mistake.flip_pan = true; }},
         RigFault{"mirrored", [](RigTrialSetup& s) { s.mistake.mirror = true; }},
+        RigFault{"half_pan", [](RigTrialSetup& s) { s.mistake.pan_read = 0.5; }},
+        RigFault{"double_pan", [](RigTrialSetup& s) { s.mistake.pan_read = 2.0; }},
         RigFault{"turned_corners", [](RigTrialSetup& s) { s.mistake.turn_corners = true; }},
         RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
     [](const auto& info) { return std::string(info.param.name); });
@@ -154,6 +156,23 @@ TEST(RigTable, AnglesOfTheViewBeforeOfOneHeadAreNamed) {
                    if (before) view.pan_tilt_rad = *before;
                    before = own;
                  }
+               });
+}
+
+TEST(RigTable, HalfAndDoubleAnglesOfAnAxisAreNamed) {
+  const auto scale = [](int head, const Eigen::Vector2d& by) {
+    return [head, by](const RigScene&, std::uint64_t, std::vector<HeadView>& views) {
+      for (HeadView& view : views)
+        if (head == 0 || view.head == head) view.pan_tilt_rad = view.pan_tilt_rad.cwiseProduct(by);
+    };
+  };
+  expect_named("the pan angles of head 2 are half of what the head turns", scale(2, {0.5, 1.0}));
+  expect_named("the tilt angles of head 1 are half of what the head turns", scale(1, {1.0, 0.5}));
+  expect_named("the pan angles of head 1 are twice what the head turns", scale(1, {2.0, 1.0}));
+  expect_named("the angles are half of what the head turns", scale(0, {0.5, 0.5}));
+  expect_named("the pan angles of head 2 are half of what the head turns",
+               [](const RigScene& scene, std::uint64_t, std::vector<HeadView>& views) {
+                 views = mistaken_views(std::move(views), scene, {.pan_read = 0.5});
                });
 }
 

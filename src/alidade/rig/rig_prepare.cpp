@@ -48,16 +48,6 @@ double sigma_of_poses(const std::vector<std::optional<BoardPoseFit>>& poses) {
   return std::sqrt(median_of(variances));
 }
 
-MountingStart mounting_of(const Work& work, std::size_t head, double unit) {
-  std::vector<TurnedView> turned;
-  for (std::size_t v = 0; v < work.given.size(); ++v) {
-    const RigView& view = work.problem.views[v];
-    if (view.head != head || !work.usable[v] || !work.poses[v]) continue;
-    turned.push_back({work.given[v].pan_tilt_rad * unit, work.poses[v]->pose.cam_from_board.rotation, view.board});
-  }
-  return mounting_start(turned);
-}
-
 /// Which way the encoders count, of a head that sees single points only: what explains its best board best.
 void choose_counting(const Work& work, std::size_t head, RigHead& rig_head) {
   double least = std::numeric_limits<double>::infinity();
@@ -92,6 +82,30 @@ class Travels {
  private:
   std::map<int, std::pair<Eigen::Vector2d, Eigen::Vector2d>> last_;  ///< By head: reading, travel.
 };
+
+void count_cover(Work& work) {
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    HeadCover cover{.id = work.ids[h]};
+    std::map<std::size_t, int> seen_boards;
+    for (std::size_t v = 0; v < work.given.size(); ++v) {
+      if (!work.usable[v] || work.problem.views[v].head != h) continue;
+      const Eigen::Vector2d& angles = work.given[v].pan_tilt_rad;
+      cover.lowest_rad = cover.num_views == 0 ? angles : Eigen::Vector2d(cover.lowest_rad.cwiseMin(angles));
+      cover.highest_rad = cover.num_views == 0 ? angles : Eigen::Vector2d(cover.highest_rad.cwiseMax(angles));
+      ++cover.num_views;
+      ++seen_boards[work.problem.views[v].board];
+    }
+    cover.num_boards = static_cast<int>(seen_boards.size());
+    for (const auto& [board, count] : seen_boards) {
+      const bool is_shared = std::ranges::any_of(work.problem.views, [&, board = board](const RigView& view) {
+        return view.board == board && view.head != h &&
+               work.usable[static_cast<std::size_t>(&view - work.problem.views.data())];
+      });
+      cover.num_shared_boards += is_shared ? 1 : 0;
+    }
+    work.report.covers.push_back(cover);
+  }
+}
 
 }  // namespace
 
@@ -161,11 +175,30 @@ std::optional<Rigid3> half_turn_of(std::span<const Eigen::Vector3d> points_in_bo
   return Rigid3{Eigen::Quaterniond(0.0, 0.0, 0.0, 1.0), twice_centre};
 }
 
+std::vector<Eigen::Vector2d> readings_of(std::span<const HeadView> views) {
+  std::vector<Eigen::Vector2d> readings_rad;
+  for (const HeadView& view : views) readings_rad.push_back(view.pan_tilt_rad);
+  return readings_rad;
+}
+
+MountingStart mounting_of(const Work& work, std::size_t head, std::span<const Eigen::Vector2d> readings_rad) {
+  std::vector<TurnedView> turned;
+  for (std::size_t v = 0; v < work.given.size(); ++v) {
+    const RigView& view = work.problem.views[v];
+    if (view.head != head || !work.usable[v] || !work.poses[v]) continue;
+    turned.push_back({readings_rad[v], work.poses[v]->pose.cam_from_board.rotation, view.board});
+  }
+  return mounting_start(turned);
+}
+
 bool start_mountings(Work& work) {
-  constexpr double suspicious_rad = 3.0 * degree;
+  const std::vector<Eigen::Vector2d> as_read = readings_of(work.given);
+  std::vector<Eigen::Vector2d> as_degrees = as_read;
+  for (Eigen::Vector2d& reading : as_degrees) reading *= degree;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    const MountingStart mounting = mounting_of(work, h, 1.0);
-    if (mounting.misfit_rad > suspicious_rad && mounting_of(work, h, degree).misfit_rad < 0.3 * mounting.misfit_rad)
+    const MountingStart mounting = mounting_of(work, h, as_read);
+    if (mounting.misfit_rad > suspicious_misfit_rad &&
+        mounting_of(work, h, as_degrees).misfit_rad < clear_misfit * mounting.misfit_rad)
       return false;
     Head& head = work.heads[h].head;
     head.cam_from_tilt = mounting.cam_from_tilt;
@@ -200,6 +233,17 @@ void choose_free(Work& work) {
     free.erase(std::unique(free.begin(), free.end()), free.end());
     work.problem.free.push_back(free);
   }
+}
+
+Work prepared_work(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                   const std::map<int, Camera>& cameras, const RigConfig& config, const FreedParams& freed,
+                   const Progress& progress) {
+  Work work{views, config, progress, freed, {}, {}, {}, {}, {}, {}, {}};
+  work.problem.points_in_board = points_in_board;
+  index_views(work, cameras);
+  fit_poses(work);
+  count_cover(work);
+  return work;
 }
 
 }  // namespace alidade

@@ -8,8 +8,10 @@
 
 #include "alidade/board/board_pose.h"
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/rig/rig.h"
 #include "alidade/rig/rig_solve.h"
+#include "alidade/rig/rig_start.h"
 
 /// The steps of calibrate_rig() before the solve, and what they hand on.
 namespace alidade {
@@ -50,6 +52,12 @@ struct Work {
                                       const std::map<int, Camera>& cameras, const RigConfig& config,
                                       const Progress& progress);
 
+/// Everything before the first solve: the views by index, their boards' poses, and what each head covers. Keeps
+/// references to what it is given.
+[[nodiscard]] Work prepared_work(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                                 const std::map<int, Camera>& cameras, const RigConfig& config,
+                                 const FreedParams& freed, const Progress& progress);
+
 /// Heads and boards by index; views without a camera or corners of the board are named and rejected.
 void index_views(Work& work, const std::map<int, Camera>& cameras);
 /// The pose of the board of each view by itself, and with them σ of a corner.
@@ -60,6 +68,13 @@ void fit_poses(Work& work);
 /// By which a board's points come to stand in reverse order, the last where the first was: half a turn about its
 /// centre. None: it has no such symmetry.
 [[nodiscard]] std::optional<Rigid3> half_turn_of(std::span<const Eigen::Vector3d> points_in_board);
+/// What each view's encoders read.
+[[nodiscard]] std::vector<Eigen::Vector2d> readings_of(std::span<const HeadView> views);
+/// By the rotations of its boards alone, with these readings, one per view.
+[[nodiscard]] MountingStart mounting_of(const Work& work, std::size_t head,
+                                        std::span<const Eigen::Vector2d> readings_rad);
+/// Rotations that agree no better than this were read otherwise than meant if another reading leaves this share of it.
+inline constexpr double suspicious_misfit_rad = 3.0 * degree, clear_misfit = 0.3;
 /// Mountings of all heads; false where the readings are degrees.
 [[nodiscard]] bool start_mountings(Work& work);
 /// Which parameters are estimated.

@@ -209,7 +209,9 @@ std::vector<HeadView> mistaken_views(std::vector<HeadView> views, const RigScene
     const auto head = std::find_if(scene.rig.heads.begin(), scene.rig.heads.end(), is_of);
     if (mistake.mirror && head != scene.rig.heads.end())
       for (Corner& corner : view.seen.corners) corner.px.x() = head->camera.width_px - 1.0 - corner.px.x();
-    if (mistake.turn_corners && scene.rig.heads.size() > 1 && view.head == scene.rig.heads[1].head.id)
+    const bool is_second = scene.rig.heads.size() > 1 && view.head == scene.rig.heads[1].head.id;
+    if (is_second) view.pan_tilt_rad.x() *= mistake.pan_read;
+    if (mistake.turn_corners && is_second)
       for (Corner& corner : view.seen.corners) corner.index = scene.board.cols * scene.board.rows - 1 - corner.index;
     if (mistake.swap_heads && scene.rig.heads.size() == 2)
       view.head = scene.rig.heads[view.head == scene.rig.heads[0].head.id ? 1 : 0].head.id;

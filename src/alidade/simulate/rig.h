@@ -63,6 +63,7 @@ struct RigMistake {
   bool mirror = false;        ///< Images are mirrored.
   bool swap_heads = false;    ///< The heads' numbers are exchanged.
   bool shift_rows = false;    ///< Each view has the angles of the one before.
+  double pan_read = 1.0;      ///< What the second head's pan column has of its true angles: half, or twice.
   bool turn_corners = false;  ///< The second head's corners are numbered from the other end of the board.
 };
 [[nodiscard]] std::vector<HeadView> mistaken_views(std::vector<HeadView> views, const RigScene& scene,

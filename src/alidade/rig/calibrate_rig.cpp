@@ -87,7 +87,7 @@ class BestMisreading {
 std::optional<RigReport> misread_by_rotations(const Work& table, const std::map<int, Camera>& cameras) {
   constexpr std::size_t most_tried = 3;
   if (table.given.size() < min_views || mirrored_head(table) ||
-      !(rotation_misfit_rad(table, readings_of(table.given)) > suspicious_misfit_rad))
+      !(rotation_misfit_rad(table, table.given) > suspicious_misfit_rad))
     return std::nullopt;
   std::vector<Misreading> others = misreadings(table);
   std::erase_if(others, [](const Misreading& other) { return !(other.misfit_left.value_or(1.0) < clear_misfit); });
@@ -125,6 +125,7 @@ std::set<int> odd_boards(std::span<const HeadView> views, const RigReport& repor
   int all_rejected = 0;
   for (std::size_t v = 0; v < views.size() && v < report.views.size(); ++v) {
     if (!report.views[v].used) {
+      if (!report.views[v].misreading.empty()) continue;  // explained
       ++rejected[views[v].board];
       ++all_rejected;
       continue;

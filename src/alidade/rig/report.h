@@ -17,9 +17,10 @@ ALIDADE_PUBLIC_BEGIN
 /// One view after the solve.
 struct HeadViewFit {
   bool used = false;
-  std::string reason;   ///< Why it was not used; empty otherwise.
-  double chi2 = 0.0;    ///< Corners and reading, against the rig as solved; also of a view that was rejected.
-  double rms_px = 0.0;  ///< Per point.
+  std::string reason;      ///< Why it was not used; empty otherwise.
+  std::string misreading;  ///< Of its row, with which it would fit: "fits board 3"; empty: none that was tried.
+  double chi2 = 0.0;       ///< Corners and reading, against the rig as solved; also of a view that was rejected.
+  double rms_px = 0.0;     ///< Per point.
   Eigen::Vector2d reading_correction_rad = Eigen::Vector2d::Zero();  ///< Estimated reading minus actual reading.
   std::vector<Eigen::Vector2d> residual_px;                          ///< Prediction − observation, one per corner.
   double cluster_z2 = 0.0;  ///< Its squared influence on the rig over that of its noise alone; 0: unused.

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/rig/checks/rejected_view.h"
 #include "alidade/rig/rig_causes.h"
 #include "alidade/rig/rig_clusters.h"
 #include "alidade/rig/rig_frame.h"
@@ -57,16 +58,21 @@ void correct_reading(const Work& work, RigState& state, std::size_t v) {
   }
 }
 
+/// Beyond it a view disagrees with the rig, of which a typical one has this χ² over its count.
+double max_mean_chi2(const Work& work, double typical_mean, std::size_t v) {
+  const auto rows = static_cast<double>(2 * work.given[v].seen.corners.size() + 2);
+  return std::max(1.0, typical_mean) * std::max(4.0, 1.0 + 8.0 * std::sqrt(2.0 / rows));
+}
+
 std::vector<double> hard_weights(const Work& work, RigState& state, const std::vector<double>& before) {
   for (std::size_t v = 0; v < before.size(); ++v)
     if (work.usable[v] && before[v] < 0.5) correct_reading(work, state, v);
   const std::vector<double> mean = mean_chi2(work, state);
-  const double scale = std::max(1.0, typical(work, mean));
+  const double typical_mean = typical(work, mean);
   std::vector<double> weights;
   for (std::size_t v = 0; v < mean.size(); ++v) {
-    const auto rows = static_cast<double>(2 * work.given[v].seen.corners.size() + 2);
-    const double most = scale * std::max(4.0, 1.0 + 8.0 * std::sqrt(2.0 / rows));
-    const bool keep = std::isfinite(mean[v]) && (mean[v] <= most || !work.config.reject_outliers);
+    const bool is_near = mean[v] <= max_mean_chi2(work, typical_mean, v);
+    const bool keep = std::isfinite(mean[v]) && (is_near || !work.config.reject_outliers);
     weights.push_back(keep ? 1.0 : 0.0);
   }
   return weights;
@@ -139,40 +145,17 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
   return solved;
 }
 
-/// Why a view does not fit: where its board seems to stand, and whether another head would explain it.
-std::string reason_of(const Work& work, const RigState& state, std::size_t v) {
-  const RigView& view = work.problem.views[v];
-  if (!work.poses[v]) return "outlier: its pixels do not fit";
-  const Rigid3& cam_from_board = work.poses[v]->pose.cam_from_board;
-  const auto off = [&](std::size_t head, const Rigid3& seen) {
-    const Rigid3 expected =
-        cam_from_world(state.heads[head].head, work.given[v].pan_tilt_rad) * state.world_from_board[view.board];
-    return std::pair{expected.rotation.angularDistance(seen.rotation),
-                     (expected.translation - seen.translation).norm()};
-  };
-  const auto [angle_rad, length_m] = off(view.head, cam_from_board);
-  if (const auto turn = half_turn_of(work.problem.points_in_board); turn && angle_rad > 0.5 * std::numbers::pi) {
-    const auto [turned_rad, turned_m] = off(view.head, cam_from_board * *turn);
-    if (turned_rad < 2.0 * degree && turned_m < 0.05)
-      return "outlier: its corners are numbered from the other end of the board";
-  }
-  for (std::size_t h = 0; h < state.heads.size(); ++h) {
-    const auto [other_rad, other_m] = off(h, cam_from_board);
-    if (h != view.head && other_rad < 2.0 * degree && other_m < 0.05 && angle_rad + length_m > 0.1)
-      return "outlier: it fits head " + std::to_string(work.ids[h]) + "; heads swapped?";
-  }
-  char text[96];
-  std::snprintf(text, sizeof text, "outlier: the board is %.1f° and %.0f mm from where this head's angles put it",
-                angle_rad / degree, 1e3 * length_m);
-  return text;
-}
-
 void describe_views(Work& work, const SolvedRig& solved, const std::vector<double>& weights) {
   double squares = 0.0, num = 0.0;
+  const double typical_mean = typical(work, mean_chi2(work, solved.state));
   for (std::size_t v = 0; v < work.given.size(); ++v) {
     HeadViewFit& fit = work.report.views[v];
     fit.used = weights[v] > 0.0;
-    if (!fit.used && fit.reason.empty()) fit.reason = reason_of(work, solved.state, v);
+    if (!fit.used && fit.reason.empty()) {
+      const Rejection why = rejection_of(work, solved.state, v, max_mean_chi2(work, typical_mean, v));
+      fit.reason = why.reason;
+      fit.misreading = why.misreading;
+    }
     (fit.used ? work.report.views_used : work.report.views_dropped) += 1;
     if (fit.used) ++work.report.covers[work.problem.views[v].head].num_used;
     const auto at = view_residuals(work.problem, solved.state, v);

@@ -175,30 +175,21 @@ std::optional<Rigid3> half_turn_of(std::span<const Eigen::Vector3d> points_in_bo
   return Rigid3{Eigen::Quaterniond(0.0, 0.0, 0.0, 1.0), twice_centre};
 }
 
-std::vector<Eigen::Vector2d> readings_of(std::span<const HeadView> views) {
-  std::vector<Eigen::Vector2d> readings_rad;
-  for (const HeadView& view : views) readings_rad.push_back(view.pan_tilt_rad);
-  return readings_rad;
-}
-
-MountingStart mounting_of(const Work& work, std::size_t head, std::span<const Eigen::Vector2d> readings_rad) {
+MountingStart mounting_of(const Work& work, std::size_t head, std::span<const HeadView> views, double unit_rad) {
   std::vector<TurnedView> turned;
-  for (std::size_t v = 0; v < work.given.size(); ++v) {
-    const RigView& view = work.problem.views[v];
-    if (view.head != head || !work.usable[v] || !work.poses[v]) continue;
-    turned.push_back({readings_rad[v], work.poses[v]->pose.cam_from_board.rotation, view.board});
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (views[v].head != work.ids[head] || !work.usable[v] || !work.poses[v]) continue;
+    turned.push_back(
+        {views[v].pan_tilt_rad * unit_rad, work.poses[v]->pose.cam_from_board.rotation, work.problem.views[v].board});
   }
   return mounting_start(turned);
 }
 
 bool start_mountings(Work& work) {
-  const std::vector<Eigen::Vector2d> as_read = readings_of(work.given);
-  std::vector<Eigen::Vector2d> as_degrees = as_read;
-  for (Eigen::Vector2d& reading : as_degrees) reading *= degree;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    const MountingStart mounting = mounting_of(work, h, as_read);
+    const MountingStart mounting = mounting_of(work, h, work.given);
     if (mounting.misfit_rad > suspicious_misfit_rad &&
-        mounting_of(work, h, as_degrees).misfit_rad < clear_misfit * mounting.misfit_rad)
+        mounting_of(work, h, work.given, degree).misfit_rad < clear_misfit * mounting.misfit_rad)
       return false;
     Head& head = work.heads[h].head;
     head.cam_from_tilt = mounting.cam_from_tilt;

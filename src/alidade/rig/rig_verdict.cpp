@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <utility>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/rig/rig.h"
@@ -158,14 +160,35 @@ void add_boards(const RigReport& report, Verdict& verdict) {
                                     least, 3.0, ""));
 }
 
-void add_fit(const RigReport& report, Verdict& verdict) {
-  std::string named;
-  int outliers = 0;
+/// The rejected views by number, those together that would fit by the same change of their rows.
+std::string rejected_views(const RigReport& report) {
+  std::vector<std::pair<std::string, std::string>> groups;  // change, views
   for (std::size_t v = 0; v < report.views.size(); ++v) {
-    if (report.views[v].used) continue;
-    named += (named.empty() ? "" : ", ") + std::to_string(v + 1);
-    ++outliers;
+    const HeadViewFit& fit = report.views[v];
+    if (fit.used) continue;
+    auto group = std::ranges::find(groups, fit.misreading, &std::pair<std::string, std::string>::first);
+    if (group == groups.end()) group = groups.insert(group, {fit.misreading, ""});
+    group->second += (group->second.empty() ? "" : ", ") + std::to_string(v + 1);
   }
+  std::string text;
+  for (const auto& [change, views] : groups)
+    text += (text.empty() ? "" : "; ") + views + (change.empty() ? "" : " (" + change + ")");
+  return text;
+}
+
+/// A change of their rows explains all views that were rejected, or nearly all.
+bool are_misread(const RigReport& report) {
+  int explained = 0, rejected = 0;
+  for (const HeadViewFit& fit : report.views) {
+    rejected += fit.used ? 0 : 1;
+    explained += fit.misreading.empty() ? 0 : 1;
+  }
+  return explained > 0 && 5 * explained >= 4 * rejected;
+}
+
+void add_fit(const RigReport& report, Verdict& verdict) {
+  std::string named = rejected_views(report);
+  const auto outliers = std::ranges::count(report.views, false, &HeadViewFit::used);
   const auto lost =
       std::ranges::find_if(report.covers, [](const HeadCover& cover) { return 2 * cover.num_used < cover.num_views; });
   const bool is_lost = lost != report.covers.end();
@@ -173,9 +196,10 @@ void add_fit(const RigReport& report, Verdict& verdict) {
     named += "; these are " + std::to_string(lost->num_views - lost->num_used) + " of the " +
              std::to_string(lost->num_views) + " of head " + std::to_string(lost->id);
   const auto given = static_cast<double>(report.views.size());
-  const State state = outliers == 0 ? State::good : is_lost || outliers > 0.4 * given ? State::refused : State::care;
+  const bool are_many = is_lost || static_cast<double>(outliers) > 0.4 * given;
+  const State state = outliers == 0 ? State::good : are_many ? State::refused : State::care;
   verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all views agree" : "rejected: view " + named,
-                                    outliers, 0.4 * given, ""));
+                                    static_cast<double>(outliers), 0.4 * given, ""));
   if (report.dof < 1) return;
   const double ratio = report.chi2_per_dof(), most = 1.3 + 3.0 * std::sqrt(2.0 / report.dof);
   verdict.checks.push_back(check_of("fit", ratio < most ? State::good : State::care,
@@ -247,6 +271,29 @@ void add_views(const RigReport& report, Verdict& verdict) {
                                           "blur, an encoder's jitter, the board's shape, or the lens", "residuals"));
 }
 
+/// The check of care that is named first: more views of the same do not remove a cause, or rows to be corrected; these
+/// come before what views lack.
+const Check* first_of_care(const RigReport& report, const Verdict& verdict) {
+  const Check* care = nullptr;
+  for (const Check& check : verdict.checks)
+    if (check.state == State::care && care == nullptr) care = &check;
+  for (const std::string_view cause : {"outliers", "estimated", "causes"}) {
+    const auto named = std::ranges::find(verdict.checks, cause, &Check::name);
+    if (cause == "outliers" && !are_misread(report)) continue;
+    if (named != verdict.checks.end() && named->state == State::care) care = &*named;
+  }
+  return care;
+}
+
+Verdict refusal_by_check(const RigReport& report, const Check& refused) {
+  if (refused.name != "outliers")
+    return undetermined("too little for this noise: " + refused.text,
+                        "look at more boards, nearer, from more pans and tilts");
+  return rig_refusal(State::not_converged, ExitCode::no_convergence, "the views do not agree: " + refused.text,
+                     are_misread(report) ? "correct these rows, and calibrate again"
+                                         : "check that each view has its own angles, head and board");
+}
+
 }  // namespace
 
 Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
@@ -261,29 +308,15 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   add_views(report, verdict);
   add_causes(report, verdict);
   add_freed(report, verdict);
-  const auto first = [&](State state) {
-    return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
-  };
-  const auto refused = first(State::refused);
-  auto care = first(State::care);
-  // More views of the same do not remove a cause: it is named before what they lack.
-  for (const char* cause : {"estimated", "causes"}) {
-    const auto named = std::ranges::find(verdict.checks, cause, &Check::name);
-    if (named != verdict.checks.end() && named->state == State::care) care = named;
+  if (const auto refused = std::ranges::find(verdict.checks, State::refused, &Check::state);
+      refused != verdict.checks.end()) {
+    Verdict refusal = refusal_by_check(report, *refused);
+    refusal.checks = std::move(verdict.checks);
+    return refusal;
   }
-  if (refused != verdict.checks.end()) {
-    const std::vector<Check> checks = verdict.checks;
-    verdict = refused->name == "outliers" ? rig_refusal(State::not_converged, ExitCode::no_convergence,
-                                                        "the views do not agree: " + refused->text,
-                                                        "check that each view has its own angles, head and board")
-                                          : undetermined("too little for this noise: " + refused->text,
-                                                         "look at more boards, nearer, from more pans and tilts");
-    verdict.checks = checks;
-    return verdict;
-  }
-  if (care != verdict.checks.end()) {
+  if (const Check* const care = first_of_care(report, verdict)) {
     verdict.state = State::care;
-    verdict.to_add = care->text;
+    verdict.to_add = care->text + (care->name == "outliers" && are_misread(report) ? "; correct these rows" : "");
   }
   const auto num = report.rig.heads.size();
   verdict.sentence = std::to_string(num) + (num == 1 ? " head" : " heads") + " from " +

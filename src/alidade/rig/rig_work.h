@@ -68,11 +68,9 @@ void fit_poses(Work& work);
 /// By which a board's points come to stand in reverse order, the last where the first was: half a turn about its
 /// centre. None: it has no such symmetry.
 [[nodiscard]] std::optional<Rigid3> half_turn_of(std::span<const Eigen::Vector3d> points_in_board);
-/// What each view's encoders read.
-[[nodiscard]] std::vector<Eigen::Vector2d> readings_of(std::span<const HeadView> views);
-/// By the rotations of its boards alone, with these readings, one per view.
-[[nodiscard]] MountingStart mounting_of(const Work& work, std::size_t head,
-                                        std::span<const Eigen::Vector2d> readings_rad);
+/// By the rotations of its boards alone. `views`: those of the table, with heads and readings as they are to be taken.
+[[nodiscard]] MountingStart mounting_of(const Work& work, std::size_t head, std::span<const HeadView> views,
+                                        double unit_rad = 1.0);
 /// Rotations that agree no better than this were read otherwise than meant if another reading leaves this share of it.
 inline constexpr double suspicious_misfit_rad = 3.0 * degree, clear_misfit = 0.3;
 /// Mountings of all heads; false where the readings are degrees.

@@ -19,12 +19,14 @@ struct Misreading {
   std::optional<double> misfit_left = {};
 };
 
-/// How far the rotations of the heads' boards contradict each other with these readings, one per view, whatever the
-/// rest of the rig is: mean angle of all that can be compared. 0: nothing can. `work`: with its views' poses.
-[[nodiscard]] double rotation_misfit_rad(const Work& work, std::span<const Eigen::Vector2d> readings_rad);
+/// How far the rotations of the heads' boards contradict each other with the heads and readings of these views, those
+/// of the table, whatever the rest of the rig is: mean angle of all that can be compared. 0: nothing can. `work`: with
+/// its views' poses.
+[[nodiscard]] double rotation_misfit_rad(const Work& work, std::span<const HeadView> views);
 
-/// Exchanged, shifted, half and double angles, corners numbered from the other end: of all heads, then of each. Those
-/// by which the boards' rotations agree no better are left out.
+/// Exchanged, shifted, half and double angles, corners numbered from the other end, of all heads, then of each; angles
+/// shifted or heads exchanged in a part of the table. Those by which the boards' rotations agree no better are left
+/// out.
 [[nodiscard]] std::vector<Misreading> misreadings(const Work& work);
 
 }  // namespace alidade

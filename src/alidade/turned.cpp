@@ -41,7 +41,10 @@ TurnedConfig turned_config(const ObserveSetup& setup, bool is_ordinary) {
     config.lens_terms = setup.nuisances.k2 ? 2 : setup.nuisances.k1 ? 1 : 0;
     config.keeps_terms = true;
   }
-  if (setup.lens_is_given) config.lens_terms = 0;
+  if (setup.lens_is_given) {
+    config.lens_terms = 0;
+    config.keeps_terms = true;
+  }
   return config;
 }
 
@@ -88,13 +91,16 @@ void add_photo_rows(const TurnedReport& solved, ObserveReport& report) {
 }
 
 void add_photo_quantities(const TurnedReport& solved, ObserveReport& report) {
-  static const char* const names[] = {"fx", "fy", "cx", "cy", "k1", "k2"};
-  const Eigen::Index count = 4 + solved.lens_terms;
-  for (Eigen::Index i = 0; i < count; ++i) {
+  static const char* const names[] = {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
+  std::vector<int> places{0, 1, 2, 3};
+  for (std::size_t i = 0; i < 3 && static_cast<int>(i) < solved.lens_terms; ++i) places.push_back(radial_places[i]);
+  if (solved.decentred) places.insert(places.end(), {decentring_place, decentring_place + 1});
+  std::ranges::sort(places);
+  for (const int i : places) {
     const double model = std::sqrt(solved.cov_model(i, i));
     report.quantities.push_back({names[i], solved.camera[i], std::sqrt(solved.cov(i, i)), model, model});
   }
-  report.covariance = solved.cov.topLeftCorner(count, count);
+  report.covariance = solved.cov(places, places);
 }
 
 void add_photo_residuals(const TurnedReport& solved, const MatchedPhotos& matches, ObserveReport& report) {

@@ -42,9 +42,11 @@ std::optional<Eigen::Vector2d> pixel_of(const TurnedScene& scene, const TurnedVi
   if (!(Y.z() > 0.1 * Y.norm())) return std::nullopt;
   const Eigen::Vector2d x = Y.head<2>() / Y.z();
   const double r2 = x.squaredNorm();
-  if (!(1.0 + r2 * (3.0 * scene.k1 + 5.0 * scene.k2 * r2) > 0.0)) return std::nullopt;
-  const double d = view.zoom * (1.0 + r2 * (scene.k1 + scene.k2 * r2));
-  const Eigen::Vector2d px(scene.fx * d * x.x() + scene.cx, scene.fy * d * x.y() + scene.cy);
+  if (!(1.0 + r2 * (3.0 * scene.k1 + r2 * (5.0 * scene.k2 + 7.0 * scene.k3 * r2)) > 0.0)) return std::nullopt;
+  const double d = 1.0 + r2 * (scene.k1 + r2 * (scene.k2 + r2 * scene.k3)), xy = 2.0 * x.x() * x.y();
+  const double u = d * x.x() + scene.p1 * xy + scene.p2 * (r2 + 2.0 * x.x() * x.x());
+  const double v = d * x.y() + scene.p1 * (r2 + 2.0 * x.y() * x.y()) + scene.p2 * xy;
+  const Eigen::Vector2d px(view.zoom * scene.fx * u + scene.cx, view.zoom * scene.fy * v + scene.cy);
   const bool inside = px.x() > 0.0 && px.y() > 0.0 && px.x() < scene.width_px - 1 && px.y() < scene.height_px - 1;
   return inside ? std::optional(px) : std::nullopt;
 }

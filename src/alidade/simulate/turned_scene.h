@@ -12,7 +12,7 @@ namespace alidade {
 struct TurnedScene {
   int width_px = 1280, height_px = 960;
   double fx = 1000.0, fy = 1000.0, cx = 645.0, cy = 474.0;  ///< [px]
-  double k1 = 0.0, k2 = 0.0;
+  double k1 = 0.0, k2 = 0.0, p1 = 0.0, p2 = 0.0, k3 = 0.0;
   int num_photos = 9;
   double pan_step_rad = 0.3, tilt_rad = 0.15;  ///< From photo to photo; alternately up and down.
   double shake_rad = 0.03;                     ///< σ of every angle, the roll's as well.

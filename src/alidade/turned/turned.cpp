@@ -205,29 +205,26 @@ class TurnedRun {
     for (const PhotoLink& link : links_) report_.matches.given += photos_.pairs[link.pair].matches.size();
   }
 
-  /// With fewer terms of the lens, where no free one differs significantly from zero; their uncertainty is still
-  /// included.
+  /// With the terms of the lens that differ significantly from zero; the others' uncertainty is still included.
   void state_covariance() {
-    ScatterCovariance scatter = scatter_covariance(fit_, progress_);
-    report_.lens_terms = free_.lens_terms;
-    while (report_.lens_terms > 0 && !config_.keeps_terms) {
-      constexpr double given_beyond = 3.0;  // σ
-      const int last = num_camera - 3 + report_.lens_terms;
-      if (std::abs(fit_.bundle.camera[last]) > given_beyond * std::sqrt(scatter.cov(last, last))) break;
-      const Eigen::Vector4d before = fit_.bundle.camera.head<4>();
-      free_.lens_terms = --report_.lens_terms;
+    if (!config_.keeps_terms) {
+      free_.lens_terms = static_cast<int>(radial_places.size());
+      free_.decentred = true;
       fit_ = fit_again(photos_, tree_, std::move(fit_), free_, progress_);
-      ScatterCovariance less = scatter_covariance(fit_, progress_);
-      // σ includes that of the fixed terms, and the change of the answer when they are estimated: either may be the
-      // right lens
-      const Eigen::Vector4d moved = fit_.bundle.camera.head<4>() - before;
-      const Eigen::Vector4d more = (scatter.cov - less.cov).diagonal().head<4>().cwiseMax(0.0) + moved.cwiseAbs2();
-      less.cov.diagonal().head<4>() += more;
-      if (report_.lens_terms > 0) less.cov(4, 4) = std::max(less.cov(4, 4), scatter.cov(4, 4));
-      less.cov(0, 1) += std::sqrt(more[0] * more[1]);  // a lens' terms move both alike
-      less.cov(1, 0) = less.cov(0, 1);
-      scatter = less;
     }
+    ScatterCovariance scatter = scatter_covariance(fit_, progress_);
+    if (!config_.keeps_terms) {
+      const bool drops_k3 = is_nearly_zero(radial_places[2], scatter), drops_p = !is_decentred(scatter);
+      if (drops_k3 || drops_p) drop(drops_k3 ? 2 : 3, !drops_p, scatter);
+      while (free_.lens_terms > 0 &&
+             is_nearly_zero(radial_places[static_cast<std::size_t>(free_.lens_terms - 1)], scatter))
+        drop(free_.lens_terms - 1, free_.decentred, scatter);
+    }
+    scatter.cov.diagonal() += by_lens_;
+    scatter.cov(0, 1) += std::sqrt(by_lens_[0] * by_lens_[1]);  // a lens' terms move both alike
+    scatter.cov(1, 0) = scatter.cov(0, 1);
+    report_.lens_terms = free_.lens_terms;
+    report_.decentred = free_.decentred;
     note_fit();
     for (std::size_t k = 0; k < scatter.z2.size(); ++k) photo_at(k).z2 = scatter.z2[k];
     report_.parallax = parallax_of(fit_);
@@ -238,15 +235,51 @@ class TurnedRun {
     report_.parallax.rms_px *= scale_.half_width_px;
     report_.design_effect = scatter.design_effect;
     report_.degrees_of_freedom = scatter.degrees_of_freedom;
-    const Eigen::Matrix<double, 6, 1> unit = note_camera();
+    const TurnedCamera unit = note_camera();
     report_.cov_model = unit.asDiagonal() * scatter.cov_model * unit.asDiagonal();
     report_.cov = unit.asDiagonal() * scatter.cov * unit.asDiagonal();
     add_given();
   }
 
+  [[nodiscard]] bool is_nearly_zero(int term, const ScatterCovariance& scatter) const {
+    return std::abs(fit_.bundle.camera[term]) <= three_sigma_of(term, scatter) * std::sqrt(scatter.cov(term, term));
+  }
+
+  /// As unlikely as 3 σ are, in the σ of a term: the part that a few photos' scatter told has Student's tails
+  /// (Abramowitz & Stegun 26.7.5), ν by Satterthwaite.
+  [[nodiscard]] static double three_sigma_of(int term, const ScatterCovariance& scatter) {
+    const double share = 1.0 - std::min(scatter.cov_model(term, term) / scatter.cov(term, term), 1.0);
+    const double nu = std::max(scatter.degrees_of_freedom, 4.0) / std::max(share * share, 1e-6);
+    const double t = 3.0 + 7.5 / nu + 17.25 / (nu * nu) + 30.2 / (nu * nu * nu);
+    return t * std::sqrt((nu - 2.0) / nu);
+  }
+
+  /// Significantly, and by no more than lenses are: what moves, or zooms, may look like a lens that no one makes.
+  [[nodiscard]] bool is_decentred(const ScatterCovariance& scatter) const {
+    const Eigen::Matrix2d cov = scatter.cov.block<2, 2>(decentring_place, decentring_place);
+    const Eigen::Vector2d p = fit_.bundle.camera.segment<2>(decentring_place);
+    constexpr double most = 5e-3, both = 1.31;  // five of ordinary lenses' σ; χ² of two as unlikely as 3² of one
+    const double as_likely =
+        std::max(three_sigma_of(decentring_place, scatter), three_sigma_of(decentring_place + 1, scatter));
+    return p.dot(cov.inverse() * p) > both * as_likely * as_likely && p.norm() < most;
+  }
+
+  /// With fewer terms. σ includes theirs, and the change of the answer when they are estimated: either may be the right
+  /// lens.
+  void drop(int lens_terms, bool decentred, ScatterCovariance& scatter) {
+    const TurnedCamera before = fit_.bundle.camera;
+    free_.lens_terms = lens_terms;
+    free_.decentred = decentred;
+    fit_ = fit_again(photos_, tree_, std::move(fit_), free_, progress_);
+    const ScatterCovariance less = scatter_covariance(fit_, progress_);
+    const TurnedCamera moved = fit_.bundle.camera - before;
+    by_lens_ += (scatter.cov - less.cov).diagonal().cwiseMax(0.0) + moved.cwiseAbs2();
+    scatter = less;
+  }
+
   /// The camera in pixels; what a normalised unit of each parameter is.
-  Eigen::Matrix<double, 6, 1> note_camera() {
-    Eigen::Matrix<double, 6, 1> unit = Eigen::Matrix<double, 6, 1>::Ones();
+  TurnedCamera note_camera() {
+    TurnedCamera unit = TurnedCamera::Ones();
     unit.head<4>().setConstant(scale_.half_width_px);
     report_.camera = unit.cwiseProduct(fit_.bundle.camera);
     report_.camera.segment<2>(2) += scale_.centre_px;
@@ -260,7 +293,7 @@ class TurnedRun {
     const Eigen::Vector2d f = report_.camera.head<2>();
     const double estimated = std::max(report_.parallax.relative, ordinary_parallax);
     const double parallax = config_.sigma_parallax ? *config_.sigma_parallax : estimated;
-    Eigen::Matrix<double, 6, 1> moves = Eigen::Matrix<double, 6, 1>::Zero();
+    TurnedCamera moves = TurnedCamera::Zero();
     moves.head<2>() = f;
     if (report_.lens_terms > 0) moves[4] = 0.5;
     if (report_.lens_terms > 1) moves[5] = -0.125;
@@ -278,23 +311,31 @@ class TurnedRun {
     report_.assumed.push_back(steps);
   }
 
+  [[nodiscard]] double sigma_of_aspect(const TurnedCamera& camera) const {
+    const Eigen::Vector2d slope(-camera[1] / (camera[0] * camera[0]), 1.0 / camera[0]);
+    return std::sqrt(slope.dot(report_.cov.topLeftCorner<2, 2>() * slope));
+  }
+
   /// The answer with the user's fixed values; their effect on it is included.
   void hold() {
-    const Eigen::Matrix<double, 6, 1> free = report_.camera;
+    const TurnedCamera free = report_.camera;
     report_.free_centre_px = free.segment<2>(2);
     report_.sigma_free_centre_px = report_.cov.diagonal().segment<2>(2).cwiseSqrt();
+    report_.free_aspect = free[1] / free[0];
+    report_.sigma_free_aspect = sigma_of_aspect(free);
     if (!config_.square_pixels && !config_.fixed_centre) return;
     TurnedConfig held = config_;
     held.ordinary_aspect = free_.ordinary_aspect;
     held.ordinary_centre = free_.ordinary_centre;
     held.lens_terms = report_.lens_terms;
+    held.decentred = report_.decentred;
     fit_ = fit_again(photos_, tree_, std::move(fit_), held, progress_);
     note_fit();
     note_camera();
     const Eigen::Vector2d moved = report_.camera.head<2>() - free.head<2>();
-    report_.cov.topLeftCorner<2, 2>() += moved * moved.transpose();
-    if (config_.square_pixels) {
-      const double variance = report_.cov.topLeftCorner<2, 2>().mean();
+    if (!config_.square_pixels) report_.cov.topLeftCorner<2, 2>() += moved * moved.transpose();
+    if (config_.square_pixels) {  // of (fx + fy) / 2, and how far off it each of them is
+      const double variance = report_.cov.topLeftCorner<2, 2>().mean() + 0.5 * moved.squaredNorm();
       report_.cov.topLeftCorner<2, 2>().setConstant(variance);
       report_.cov.row(1) = report_.cov.row(0);
       report_.cov.col(1) = report_.cov.col(0);
@@ -330,6 +371,7 @@ class TurnedRun {
   std::vector<PhotoLink> links_;
   PhotoTree tree_;
   TurnedFit fit_;
+  TurnedCamera by_lens_ = TurnedCamera::Zero();  ///< Variances by the terms of the lens that are not estimated.
   std::size_t num_same_ = 0, num_agreeing_ = 0;
 };
 

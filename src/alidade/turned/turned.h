@@ -16,8 +16,9 @@ struct TurnedConfig {
   bool fixed_centre = false;   ///< cx, cy: the initial guess's, else the image's centre.
   /// fx / fy and the centre are typical, within a σ that is included; false: nothing is known.
   bool ordinary_aspect = true, ordinary_centre = true;
-  int lens_terms = 2;                    ///< Radial distortion: none, k1, or k1 and k2.
-  bool keeps_terms = false;              ///< All of them; false: those that differ significantly from zero.
+  int lens_terms = 2;                    ///< Radial distortion that is fitted first: none, k1, k1 and k2, k3 as well.
+  bool decentred = false;                ///< p1 and p2 as well.
+  bool keeps_terms = false;              ///< Just these; false: of all terms those that differ significantly from zero.
   std::optional<Eigen::Vector4d> start;  ///< fx, fy, cx, cy [px].
   double sigma_px = 0.0;                 ///< Of a coordinate; 0: estimated from the residuals.
   /// σ of the projection centre's motion, over the points' distance, per radian of rotation; none: typical.
@@ -39,9 +40,11 @@ struct TurnedReport {
   TurnedBundle bundle;  ///< Normalised; its photos are `bundle_photo`.
   std::vector<int> bundle_photo;
   std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one per observation.
-  Eigen::Matrix<double, 6, 1> camera;      ///< fx, fy, cx, cy [px], k1, k2.
-  Eigen::Matrix<double, 6, 6> cov, cov_model;
-  int lens_terms = 0;  ///< That are estimated; the uncertainty of the others is included in `cov`.
+  TurnedCamera camera;                     ///< fx, fy, cx, cy in px.
+  TurnedInformation cov, cov_model;
+  /// Terms of the lens that are estimated; the uncertainty of the others is included in `cov`.
+  int lens_terms = 0;
+  bool decentred = false;
   double sigma_px = 0.0;
   MatchCounts matches;
   double design_effect = 1.0;  ///< What photos change, over what the model expects of it; variances.
@@ -50,6 +53,7 @@ struct TurnedReport {
   ParallaxTest parallax;
   Eigen::Vector2d free_centre_px = Eigen::Vector2d::Zero();  ///< Its value if it is not fixed, and its σ.
   Eigen::Vector2d sigma_free_centre_px = Eigen::Vector2d::Zero();
+  double free_aspect = 1.0, sigma_free_aspect = 0.0;  ///< fy / fx, if pixels are not square.
   double other_focal_px = 0.0, other_sigmas = 0.0;  ///< A second minimum, and how much worse it is, √Δχ²; 0: none.
   std::vector<Assumption> assumed;
 };

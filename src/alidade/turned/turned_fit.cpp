@@ -69,7 +69,7 @@ double freedom_of(const TurnedBundle& bundle) {
 TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedConfig& config) {
   constexpr double exact = 1e-7, unknown_focal = 5.0, free_centre = 0.5, free_aspect = 0.5;
   constexpr double ordinary_centre = 0.03, ordinary_aspect = 1e-3;  // half widths; share
-  constexpr double corner_k1 = 0.08, corner_k2 = 0.04;
+  constexpr double corner_k1 = 0.08, corner_k2 = 0.04, corner_k3 = 0.02, ordinary_p = 1e-3;
   TurnedPrior prior;
   prior.mean.head<2>().setConstant(focal);
   if (config.start) {
@@ -89,6 +89,8 @@ TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedC
   Q(2, 2) = Q(3, 3) = information(centre);
   Q(4, 4) = information(config.lens_terms > 0 ? corner_k1 / corner : exact);
   Q(5, 5) = information(config.lens_terms > 1 ? corner_k2 / (corner * corner) : exact);
+  Q(6, 6) = Q(7, 7) = information(config.decentred ? ordinary_p : exact);
+  Q(8, 8) = information(config.lens_terms > 2 ? corner_k3 / (corner * corner * corner) : exact);
   return prior;
 }
 
@@ -176,9 +178,10 @@ TurnedFit fit_turned(const MatchedPhotos& photos, const std::vector<PhotoLink>& 
 TurnedFit fit_again(const MatchedPhotos& photos, const PhotoTree& tree, TurnedFit fit, const TurnedConfig& config,
                     const Progress& progress) {
   Rounds rounds(photos, config, false, progress, fit);
-  for (int i = num_camera - 2; i < num_camera; ++i) {
-    if (config.lens_terms <= i - (num_camera - 2)) fit.bundle.camera[i] = 0.0;
+  for (std::size_t i = 0; i < radial_places.size(); ++i) {
+    if (config.lens_terms <= static_cast<int>(i)) fit.bundle.camera[radial_places[i]] = 0.0;
   }
+  if (!config.decentred) fit.bundle.camera.segment<2>(decentring_place).setZero();
   rounds.prepare(0.5 * (fit.bundle.camera[0] + fit.bundle.camera[1]));
   rounds.solve(false);
   if (rounds.again(places_of(photos, tree), gate_sigmas)) rounds.settle();

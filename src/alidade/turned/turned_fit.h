@@ -15,9 +15,9 @@ struct TurnedFit {
   std::size_t num_kept = 0;  ///< Matches.
 };
 
-/// The camera of an initial guess, the prior about it. A lens' distortion at the image's corner is 0 within 8 % (k1)
-/// and 4 % (k2); a typical camera's pixels are square within 0.1 %, its principal point central within 1.5 % of the
-/// width.
+/// The camera of an initial guess, the prior about it. A lens' distortion at the image's corner is 0 within 8 % (k1),
+/// 4 % (k2) and 2 % (k3), its p1 and p2 within 0.001; a typical camera's pixels are square within 0.1 %, its principal
+/// point central within 1.5 % of the width.
 [[nodiscard]] TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedConfig& config);
 
 /// Adjusts the photos of a tree from one start: first the matches of which a pair agrees, then all that one camera

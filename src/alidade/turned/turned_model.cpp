@@ -9,14 +9,41 @@ namespace {
 
 constexpr double min_depth = 0.05;  // cosine of the angle to the axis: 87°
 
-/// d and the derivative of r d by r; that one above zero: the lens does not fold.
+/// d, its derivative by r², and that of r d by r; that one above zero: the lens does not fold.
 struct RadialFactor {
   double d = 1.0, by_r2 = 0.0, growth = 1.0;
 };
 
 RadialFactor radial_factor(const TurnedCamera& camera, double r2) {
-  const double k1 = camera[4], k2 = camera[5];
-  return {1.0 + r2 * (k1 + k2 * r2), k1 + 2.0 * k2 * r2, 1.0 + r2 * (3.0 * k1 + 5.0 * k2 * r2)};
+  const double k1 = camera[4], k2 = camera[5], k3 = camera[8];
+  return {1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3),
+          1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + 7.0 * r2 * k3))};
+}
+
+/// By p1 and p2: what they add to a point of the image plane at focal length 1.
+Eigen::Matrix2d decentring(const Eigen::Vector2d& x) {
+  const double r2 = x.squaredNorm(), xy = 2.0 * x.x() * x.y();
+  Eigen::Matrix2d by_p;
+  by_p << xy, r2 + 2.0 * x.x() * x.x(), r2 + 2.0 * x.y() * x.y(), xy;
+  return by_p;
+}
+
+/// Where the lens puts x, and by x.
+struct Distorted {
+  Eigen::Vector2d at;
+  Eigen::Matrix2d by_x;
+};
+
+Distorted distorted(const TurnedCamera& camera, const Eigen::Vector2d& x) {
+  const RadialFactor radial = radial_factor(camera, x.squaredNorm());
+  const double p1 = camera[6], p2 = camera[7], across = 2.0 * (p1 * x.x() + p2 * x.y());
+  Distorted out{radial.d * x + decentring(x) * camera.segment<2>(6),
+                radial.d * Eigen::Matrix2d::Identity() + 2.0 * radial.by_r2 * x * x.transpose()};
+  out.by_x(0, 0) += 2.0 * p1 * x.y() + 6.0 * p2 * x.x();
+  out.by_x(1, 1) += 6.0 * p1 * x.y() + 2.0 * p2 * x.x();
+  out.by_x(0, 1) += across;
+  out.by_x(1, 0) += across;
+  return out;
 }
 
 }  // namespace
@@ -29,8 +56,8 @@ std::optional<Eigen::Vector2d> turned_pixel(const TurnedCamera& camera, const Ei
   const RadialFactor radial = radial_factor(camera, x.squaredNorm());
   if (!(radial.growth > 0.0)) return std::nullopt;
   const double zoom = log_zoom == 0.0 ? 1.0 : std::exp(log_zoom);
-  return Eigen::Vector2d(zoom * camera[0] * x.x() * radial.d + camera[2],
-                         zoom * camera[1] * x.y() * radial.d + camera[3]);
+  const Eigen::Vector2d bent = radial.d * x + decentring(x) * camera.segment<2>(6);
+  return Eigen::Vector2d(zoom * camera.head<2>().cwiseProduct(bent) + camera.segment<2>(2));
 }
 
 bool predict_turned(const TurnedCamera& camera, const Eigen::Matrix3d& R, double log_zoom, const Eigen::Vector3d& ray,
@@ -40,42 +67,51 @@ bool predict_turned(const TurnedCamera& camera, const Eigen::Matrix3d& R, double
   const double inverse = 1.0 / Y.z();
   const Eigen::Vector2d x = Y.head<2>() * inverse;
   const double r2 = x.squaredNorm();
-  const RadialFactor radial = radial_factor(camera, r2);
-  if (!(radial.growth > 0.0)) return false;
+  if (!(radial_factor(camera, r2).growth > 0.0)) return false;
+  const Distorted bent = distorted(camera, x);
   const double zoom = std::exp(log_zoom);
-  const Eigen::Vector2d f = zoom * camera.head<2>();
-  const Eigen::Vector2d bent = f.cwiseProduct(x);  // of k1 times r²
-  out.px = bent * radial.d + camera.segment<2>(2);
-  out.J_camera << zoom * x.x() * radial.d, 0.0, 1.0, 0.0, bent.x() * r2, bent.x() * r2 * r2,  //
-      0.0, zoom * x.y() * radial.d, 0.0, 1.0, bent.y() * r2, bent.y() * r2 * r2;
-  const Eigen::Matrix2d J_px_x =
-      f.asDiagonal() * (radial.d * Eigen::Matrix2d::Identity() + 2.0 * radial.by_r2 * x * x.transpose());
+  const Eigen::Vector2d f = zoom * camera.head<2>(), straight = f.cwiseProduct(x);
+  out.px = f.cwiseProduct(bent.at) + camera.segment<2>(2);
+  out.J_camera.leftCols<4>() << zoom * bent.at.x(), 0.0, 1.0, 0.0, 0.0, zoom * bent.at.y(), 0.0, 1.0;
+  out.J_camera.col(4) = straight * r2;
+  out.J_camera.col(5) = straight * r2 * r2;
+  out.J_camera.middleCols<2>(6) = f.asDiagonal() * decentring(x);
+  out.J_camera.col(8) = straight * r2 * r2 * r2;
+  const Eigen::Matrix2d J_px_x = f.asDiagonal() * bent.by_x;
   Eigen::Matrix<double, 2, 3> J_x_Y;
   J_x_Y << inverse, 0.0, -x.x() * inverse, 0.0, inverse, -x.y() * inverse;
   const Eigen::Matrix<double, 2, 3> J_px_Y = J_px_x * J_x_Y;
   out.J_photo.leftCols<3>() = -J_px_Y * cross_matrix(Y);
-  out.J_photo.col(3) = bent * radial.d;
+  out.J_photo.col(3) = f.cwiseProduct(bent.at);
   out.J_ray = J_px_Y * R;
   return true;
 }
 
 std::optional<Eigen::Vector3d> turned_ray(const TurnedCamera& camera, double log_zoom, const Eigen::Vector2d& px) {
   const double zoom = std::exp(log_zoom);
-  const Eigen::Vector2d bent((px.x() - camera[2]) / (zoom * camera[0]), (px.y() - camera[3]) / (zoom * camera[1]));
-  const double target = bent.norm();
-  double r = target;
-  for (int i = 0; i < 30; ++i) {  // Newton on r d(r) = target
+  const Eigen::Vector2d target((px.x() - camera[2]) / (zoom * camera[0]), (px.y() - camera[3]) / (zoom * camera[1]));
+  // Newton on r d(r), then in the plane for what p1 and p2 add.
+  const double far = target.norm();
+  double r = far;
+  for (int i = 0; i < 30; ++i) {
     const RadialFactor radial = radial_factor(camera, r * r);
     if (!(radial.growth > 1e-3)) return std::nullopt;
-    const double step = (r * radial.d - target) / radial.growth;
+    const double step = (r * radial.d - far) / radial.growth;
     r -= step;
-    if (std::abs(step) < 1e-13 * (1.0 + target)) break;
+    if (std::abs(step) < 1e-13 * (1.0 + far)) break;
   }
-  const RadialFactor radial = radial_factor(camera, r * r);
-  if (!(radial.growth > 0.0) || !(r >= 0.0) || std::abs(r * radial.d - target) > 1e-9 * (1.0 + target))
-    return std::nullopt;
-  const double shrink = target > 0.0 ? r / target : 1.0;
-  return Eigen::Vector3d(bent.x() * shrink, bent.y() * shrink, 1.0).normalized();
+  if (!(r >= 0.0)) return std::nullopt;
+  Eigen::Vector2d x = far > 0.0 ? Eigen::Vector2d(target * (r / far)) : target;
+  for (int i = 0; i < 10; ++i) {
+    const Distorted bent = distorted(camera, x);
+    const Eigen::Vector2d step = bent.by_x.inverse() * (bent.at - target);
+    if (!step.allFinite()) return std::nullopt;
+    x -= step;
+    if (step.norm() < 1e-13 * (1.0 + far)) break;
+  }
+  const bool is_there = (distorted(camera, x).at - target).norm() < 1e-9 * (1.0 + far);
+  if (!is_there || !(radial_factor(camera, x.squaredNorm()).growth > 0.0)) return std::nullopt;
+  return Eigen::Vector3d(x.x(), x.y(), 1.0).normalized();
 }
 
 }  // namespace alidade

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-const TurnedCamera bent = (TurnedCamera() << 1.6, 1.58, 0.02, -0.03, -0.2, 0.05).finished();
+const TurnedCamera bent = (TurnedCamera() << 1.6, 1.58, 0.02, -0.03, -0.2, 0.05, 0.01, -0.02, 0.03).finished();
 const Eigen::Matrix3d turned = exp_so3({0.1, -0.2, 0.05}).toRotationMatrix();
 const Eigen::Vector3d ray = Eigen::Vector3d(0.3, 0.1, 1.0).normalized();
 
@@ -51,6 +51,7 @@ TEST(TurnedModel, ARayIsWhatItsPixelSees) {
 TEST(TurnedModel, BehindTheCameraAndBeyondTheFoldThereIsNoPixel) {
   TurnedCamera folds = bent;
   folds[4] = -0.3;
+  folds.tail<4>().setZero();
   folds[5] = 0.0;  // r (1 − 0.3 r²) falls from r = 1.05 on
   const Eigen::Matrix3d ahead = Eigen::Matrix3d::Identity();
   EXPECT_TRUE(turned_pixel(folds, ahead, 0.0, {1.0, 0.0, 1.0}));

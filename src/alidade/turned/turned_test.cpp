@@ -93,6 +93,40 @@ TEST(Turned, NorDoWhatMovesAndWhatBends) {
   EXPECT_LT(bent.worst, 0.004);
 }
 
+TEST(Turned, TheRestOfTheLensIsEstimatedOrCounted) {
+  for (const double p : {0.0002, 0.0005, 0.003}) {
+    TurnedScene scene = small_scene();
+    scene.p1 = p;
+    scene.p2 = -p;
+    const Drawn decentred = draw(scene, few, on_the_spot(), 500);
+    EXPECT_EQ(decentred.within_3, few) << p;
+    EXPECT_EQ(decentred.others_within_3, few) << p;
+  }
+  TurnedScene wide = small_scene();
+  wide.k1 = -0.35;
+  wide.k2 = 0.25;
+  wide.k3 = -0.12;
+  const Drawn bent = draw(wide, few, on_the_spot(), 600);
+  EXPECT_EQ(bent.within_3, few);
+  EXPECT_EQ(bent.others_within_3, few);
+}
+
+TEST(Turned, PixelsThatAreNotSquareAreNamed) {
+  for (const bool fixes : {true, false}) {
+    TurnedScene scene = small_scene();
+    scene.fy = 1.01 * scene.fx;
+    TurnedConfig config = on_the_spot();
+    config.square_pixels = fixes;
+    config.ordinary_aspect = config.ordinary_centre = false;
+    const Drawn drawn = draw(scene, few, config, 700);
+    EXPECT_EQ(drawn.within_3, few) << fixes;
+    const MatchedPhotos photos = simulate_turned_photos(scene, 700);
+    const Verdict verdict = turned_verdict(observe_turned(photos, config), photos, config);
+    EXPECT_EQ(verdict.state, State::care) << fixes;
+    EXPECT_THAT(verdict.to_add, HasSubstr(fixes ? "omit --square-pixels" : "not square")) << fixes;
+  }
+}
+
 TEST(Turned, ALeverOfMillimetresIsWithinSigmaAndOneOfDecimetresIsNamed) {
   TurnedScene scene = small_scene();
   scene.lever_m = {0.0, 0.0, 0.005};

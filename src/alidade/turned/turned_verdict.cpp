@@ -214,6 +214,27 @@ Check centre_check(const TurnedReport& report) {
   return check;
 }
 
+/// Nearly all cameras' pixels are square, and what is read row by row while the camera tilts seems not to be.
+Check aspect_check(const TurnedReport& report, const TurnedConfig& config) {
+  constexpr double most = 3.0, ordinary = 0.005;
+  const double off = std::abs(report.free_aspect - 1.0);
+  Check check{"square pixels", State::good, "", off / report.sigma_free_aspect, most, "σ", "intrinsics"};
+  check.text = "the photos put fy / fx at " + text_of(report.free_aspect, 5) + " ± " +
+               text_of(3.0 * report.sigma_free_aspect, 2) + " (3σ)";
+  if (config.square_pixels) {
+    if (check.value > most) {
+      check.state = State::care;
+      check.text += ": omit --square-pixels, unless the shutter reads row by row while the camera tilts";
+    }
+  } else if (off > ordinary && check.value > most) {
+    check.state = State::care;
+    check.text +=
+        ": pixels that are not square, or a shutter that reads row by row while the camera tilts, which makes "
+        "fy wrong by as much";
+  }
+  return check;
+}
+
 /// Why there is no estimate, in a verdict; none where there is one.
 std::optional<Verdict> refusal_of(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
   switch (report.status) {
@@ -255,6 +276,7 @@ Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, 
                     zoom_check(report, photos),
                     noise_check_of(report, photos),
                     minimum_check(report)};
+  verdict.checks.insert(verdict.checks.begin(), aspect_check(report, config));
   if (config.fixed_centre) verdict.checks.insert(verdict.checks.begin(), centre_check(report));
   for (const Check& check : verdict.checks) {
     const bool speaks = check.state == State::care || check.state == State::bad;

@@ -7,6 +7,7 @@
 
 #include "alidade/estimation/verdict.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/rig/checks/indicated_lens.h"
 #include "alidade/rig/checks/misreadings.h"
 #include "alidade/rig/rig_work.h"
 
@@ -108,10 +109,42 @@ void look_for_misreading(const Work& table, const std::map<int, Camera>& cameras
                          (report.sigma_encoder_is_estimated && report.sigma_encoder_rad > uneasy_rad);
   if (table.given.size() < min_views || (!is_bad && !is_uneasy)) return;
   BestMisreading tried(table, cameras, effort_below(is_bad ? usual_rad : as_good * report.sigma_encoder_rad));
+  const auto is_better = [&](const RigReport& otherwise) {
+    if (!is_bad) return is_far_better(otherwise, report);
+    return report.status != Status::converged || otherwise.sigma_encoder_rad < report.sigma_encoder_rad / far ||
+           otherwise.views_dropped + 2 <= report.views_dropped;
+  };
   for (const Misreading& other : misreadings(table))
-    if (is_bad || other.is_common)
-      tried.try_one(other, [&](const RigReport& otherwise) { return is_bad || is_far_better(otherwise, report); });
+    if (is_bad || other.is_common) tried.try_one(other, is_better);
   if (tried.best()) report = misread(std::move(report), *tried.best());
+}
+
+/// A lens is not as its file says: with the one that the residuals indicate the views agree far better.
+bool is_lens_off(const Work& table, const std::map<int, Camera>& cameras, const RigReport& report) {
+  constexpr int max_lenses = 3;  // corrected one after another
+  if (report.status != Status::converged) return false;
+  std::map<int, Camera> corrected = cameras;
+  RigReport last = report;
+  for (int round = 0; round < max_lenses && indicates_lens(last); ++round) {
+    const auto next = with_indicated_lens(corrected, last);
+    if (!next) return false;
+    corrected = *next;
+    last = calibrated_with(table.given, table.problem.points_in_board, corrected, table.config, {}, table.progress,
+                           {.iterations = 20, .unsettled_rounds = 2});
+    if (last.status != Status::converged) return false;
+  }
+  return !indicates_lens(last) && is_far_better(last, report);
+}
+
+/// Two cameras, each of which fits the other's head: their lenses are indicated no more. A lens file that is wrong is
+/// so beside either head.
+bool are_swapped(const Work& table, const std::map<int, Camera>& cameras, const RigReport& report) {
+  if (cameras.size() != 2 || (!is_suspicious(report) && !indicates_lens(report))) return false;
+  std::map<int, Camera> swapped = cameras;
+  std::swap(swapped.begin()->second, swapped.rbegin()->second);
+  const RigReport otherwise = calibrated_with(table.given, table.problem.points_in_board, swapped, table.config, {},
+                                              table.progress, effort_below(usual_rad));
+  return otherwise.status == Status::converged && !is_suspicious(otherwise) && !indicates_lens(otherwise);
 }
 
 /// The boards whose views' readings are corrected by more than others', or of which two views or more are rejected:
@@ -189,16 +222,11 @@ RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::
   const Work table = prepared_work(views, points_in_board, cameras, config, nothing, progress);
   if (auto misread = misread_by_rotations(table, cameras)) return std::move(*misread);
   RigReport report = calibrated_with(views, points_in_board, cameras, config, nothing, progress);
-  if (cameras.size() == 2 && is_suspicious(report)) {
-    std::map<int, Camera> swapped = cameras;
-    std::swap(swapped.begin()->second, swapped.rbegin()->second);
-    const RigReport otherwise =
-        calibrated_with(views, points_in_board, swapped, config, nothing, progress, effort_below(usual_rad));
-    if (otherwise.status == Status::converged && !is_suspicious(otherwise)) report.status = Status::swapped;
-  }
-  const bool is_alone = report.status == Status::converged || report.status == Status::no_convergence ||
-                        report.status == Status::degenerate;
-  if (is_alone) look_for_misreading(table, cameras, report);
+  if (are_swapped(table, cameras, report)) report.status = Status::swapped;
+  if (report.status == Status::swapped || is_lens_off(table, cameras, report)) return report;
+  if (report.status == Status::converged || report.status == Status::no_convergence ||
+      report.status == Status::degenerate)
+    look_for_misreading(table, cameras, report);
   if (report.status == Status::converged)
     look_for_moved_board(views, points_in_board, cameras, config, progress, report);
   return report;

@@ -62,6 +62,7 @@ struct RigCause {
   [[nodiscard]] bool is_drift() const { return name.ends_with(" drift"); }
   /// Of a lens, beyond what its file says.
   [[nodiscard]] bool is_distortion() const { return name.ends_with("camera.k1"); }
+  [[nodiscard]] bool is_of_lens() const { return name.find("camera.") != std::string::npos || name == "all centre"; }
 };
 
 /// Something that was estimated because the residuals indicated it.

@@ -218,14 +218,19 @@ void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verd
                                     sigma / degree, good_rad / degree, "°"));
 }
 
+/// The cause that is named: the most significant.
+const RigCause& first_cause(const RigReport& report) {
+  const RigCause* first = &report.causes.front();
+  for (const RigCause& cause : report.causes)
+    if (first->sigmas < rig_cause_limit && cause.sigmas > first->sigmas) first = &cause;
+  return *first;
+}
+
 /// Causes indicated by the residuals, beyond those that errors shared within views would give by chance.
 void add_causes(const RigReport& report, Verdict& verdict) {
   if (report.causes.empty()) return;
   constexpr double most = rig_cause_limit;
-  const RigCause* asked = &report.causes.front();
-  for (const RigCause& cause : report.causes)
-    if (asked->sigmas < most && cause.sigmas > asked->sigmas) asked = &cause;
-  const RigCause& first = *asked;
+  const RigCause& first = first_cause(report);
   const bool is_quiet = first.sigmas < most;
   const std::string by = ", by " + text_of(first.size, 2) + (first.unit.empty() ? "" : " " + first.unit) + " (" +
                          text_of(first.sigmas, 2) + "σ)";
@@ -285,7 +290,12 @@ const Check* first_of_care(const RigReport& report, const Verdict& verdict) {
   return care;
 }
 
-Verdict refusal_by_check(const RigReport& report, const Check& refused) {
+Verdict refusal_by_check(const RigReport& report, const Check& refused, const Verdict& verdict) {
+  const auto causes = std::ranges::find(verdict.checks, "causes", &Check::name);
+  const bool is_of_lens =
+      causes != verdict.checks.end() && causes->state == State::care && first_cause(report).is_of_lens();
+  if (is_of_lens && refused.name != "outliers")
+    return undetermined(refused.text + ": " + causes->text, "calibrate that lens again");
   if (refused.name != "outliers")
     return undetermined("too little for this noise: " + refused.text,
                         "look at more boards, nearer, from more pans and tilts");
@@ -310,7 +320,7 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   add_freed(report, verdict);
   if (const auto refused = std::ranges::find(verdict.checks, State::refused, &Check::state);
       refused != verdict.checks.end()) {
-    Verdict refusal = refusal_by_check(report, *refused);
+    Verdict refusal = refusal_by_check(report, *refused, verdict);
     refusal.checks = std::move(verdict.checks);
     return refusal;
   }

@@ -170,12 +170,10 @@ Score score_of(const RigProblem& problem, const SolvedRig& solved, const MatrixX
   return score;
 }
 
-/// σ with which it was given; none: as if exact.
+/// σ with which a scale was given; none: as if exact. What is given of lenses comes with the covariance of their files.
 double given_sigma(const std::vector<Assumption>& assumed, const std::string& name) {
-  const std::string of_all = name.substr(name.find('.') + 1);  // one lens for all heads has no head's name
-  for (const Assumption& what : assumed)
-    if (what.name == name || what.name == of_all) return what.sigma.value_or(0.0);
-  return 0.0;
+  const auto what = std::ranges::find(assumed, name, &Assumption::name);
+  return name.ends_with("_scale") && what != assumed.end() ? what->sigma.value_or(0.0) : 0.0;
 }
 
 /// One for each of its columns; what one name has two of (amplitudes) is never given.
@@ -195,26 +193,21 @@ std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& sol
   const Score score = score_of(problem, solved, cov, weights);
   std::vector<RigCause> causes;
   for (const Tested& tested : tested_of(problem, solved.state)) {
-    const VectorXd s = score.s(tested.places);
-    const VectorXd given = given_sigmas(assumed, tested);
     const SymmetricEigen eigen = symmetric_eigen(MatrixXd(score.I(tested.places, tested.places)));
-    const MatrixXd by_lenses = score.by_lenses(tested.places, Eigen::all);
-    const bool is_of_lens = tested.name.ends_with("camera.k1");
-    double chi2 = 0.0, num = 0.0;
-    VectorXd size = VectorXd::Zero(s.size());
-    for (Index k = 0; k < s.size(); ++k) {
-      if (!(eigen.values[k] * tested.worst * tested.worst > 1.0)) continue;
-      const double along = eigen.vectors.col(k).dot(s) / eigen.values[k];
-      const VectorXd moved = by_lenses.transpose() * eigen.vectors.col(k) / eigen.values[k];  // by errors of the files
-      const double of_files = is_of_lens ? moved.dot(cov_lenses * moved) : 0.0;
-      chi2 +=
-          along * along / (1.0 / eigen.values[k] + eigen.vectors.col(k).cwiseProduct(given).squaredNorm() + of_files);
-      num += 1.0;
-      size -= along * eigen.vectors.col(k);
-    }
-    if (num > 0.0)
-      causes.push_back(
-          {tested.name, s.size() == 1 ? size[0] : size.norm(), tested.unit, score_sigmas(chi2, num, num_given)});
+    const Index num = (eigen.values.array() * tested.worst * tested.worst > 1.0).count();  // the last ones
+    if (num == 0) continue;
+    const MatrixXd V = eigen.vectors.rightCols(num);
+    const VectorXd variances = eigen.values.tail(num).cwiseInverse();
+    const VectorXd along = variances.cwiseProduct(V.transpose() * score.s(tested.places));
+    // By errors of the files, and of what itself was given.
+    const MatrixXd moved = variances.asDiagonal() * V.transpose() * score.by_lenses(tested.places, Eigen::all);
+    const MatrixXd given = V.transpose() * given_sigmas(assumed, tested).asDiagonal();
+    MatrixXd C = moved * cov_lenses * moved.transpose() + given * given.transpose();
+    C.diagonal() += variances;
+    const double chi2 = along.dot(solve_symmetric(C, along));
+    const VectorXd size = -V * along;
+    causes.push_back({tested.name, size.size() == 1 ? size[0] : size.norm(), tested.unit,
+                      score_sigmas(chi2, static_cast<double>(num), num_given)});
   }
   // What names one axis says more than what names all, where it explains nearly as much.
   std::ranges::sort(causes, std::greater{},

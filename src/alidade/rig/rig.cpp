@@ -340,9 +340,10 @@ void calibrate(Work& work) {
 
 RigReport calibrated_with(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                           const std::map<int, Camera>& cameras, const RigConfig& config, const FreedParams& freed,
-                          const Progress& progress, const Effort& effort) {
+                          const Progress& progress, const Effort& effort, double sigma_free_scale) {
   Work work = prepared_work(views, points_in_board, cameras, config, freed, progress);
   work.effort = effort;
+  work.problem.sigma_scale = sigma_free_scale;
   calibrate(work);
   return std::move(work.report);
 }

@@ -87,7 +87,8 @@ class ByNeed {
     sigma_px_is_estimated_ = best_.sigma_px_is_estimated;
   }
 
-  /// Scales that are not given are estimated where holding them matters.
+  /// Scales that are not given are estimated where holding them matters. Where the views do not contradict what such
+  /// encoders ordinarily have, that counts as well.
   void free_ungiven_scales() {
     if (config_.sigma_scale || config_.estimate_scales) return;
     const bool matters = std::ranges::any_of(best_.assumed, [](const Assumption& what) {
@@ -96,10 +97,16 @@ class ByNeed {
     if (!matters) return;
     FreedParams scales;
     for (const RigHead& rig_head : best_.rig.heads) scales[rig_head.head.id] = {pan_scale_param, tilt_scale_param};
-    if (auto trial = solve(scales)) {
-      freed_ = std::move(scales);
-      best_ = std::move(*trial);
-    }
+    auto trial = solve(scales);
+    if (!trial) return;
+    freed_ = std::move(scales);
+    best_ = std::move(*trial);
+    if (!are_ordinary(best_.rig)) return;
+    sigma_free_scale_ = ordinary_scale;
+    if (auto with_prior = solve(freed_))
+      best_ = std::move(*with_prior);
+    else
+      sigma_free_scale_ = 0.0;
   }
 
   /// The cause that explains the residuals best, one after another.
@@ -116,11 +123,25 @@ class ByNeed {
   }
 
  private:
+  /// Is no scale significantly another than one?
+  static bool are_ordinary(const Rig& rig) {
+    constexpr double most = 3.0;
+    for (std::size_t h = 0; h < rig.heads.size(); ++h) {
+      const Encoder& encoder = rig.heads[h].head.encoder;
+      for (const int param : {pan_scale_param, tilt_scale_param}) {
+        const double scale = param == pan_scale_param ? encoder.pan_scale : encoder.tilt_scale;
+        const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h) + param;
+        if (!(std::abs(scale - std::copysign(1.0, scale)) < most * std::sqrt(rig.cov(at, at)))) return false;
+      }
+    }
+    return true;
+  }
+
   /// None where the views do not determine it.
   std::optional<RigReport> solve(const FreedParams& freed) {
     constexpr double worst_rad = 2.0 * degree, worst_m = 0.05;
     if (undetermined_.contains(freed)) return std::nullopt;
-    RigReport trial = calibrated_with(views_, points_, cameras_, config_, freed, progress_);
+    RigReport trial = calibrated_with(views_, points_, cameras_, config_, freed, progress_, {}, sigma_free_scale_);
     const bool is_given = trial.status == Status::converged && trial.sigma_relative_rad < worst_rad &&
                           trial.sigma_relative_m < worst_m && trial.views_used >= best_.views_used;
     if (is_given) return trial;
@@ -225,6 +246,7 @@ class ByNeed {
   RigConfig config_;
   const Progress& progress_;
   FreedParams freed_;
+  double sigma_free_scale_ = 0.0;
   std::set<FreedParams> undetermined_;
   RigReport best_;
   bool sigma_px_is_estimated_ = false;

@@ -9,7 +9,7 @@ namespace alidade {
 namespace {
 
 using Eigen::Index;
-constexpr double ordinary_scale = 0.005, ordinary_square = 0.002, ordinary_f = 0.003, ordinary_centre_px = 2.0;
+constexpr double ordinary_square = 0.002, ordinary_f = 0.003, ordinary_centre_px = 2.0;
 
 /// What is given, and how the free parameters follow it.
 struct Follows {

@@ -10,6 +10,8 @@
 
 namespace alidade {
 
+inline constexpr double ordinary_scale = 0.005;  ///< σ of an encoder's scale of which nothing is known.
+
 /// Derivatives of a view's whitened residuals by what is given: its lens, the board's size (relative), the scales; and
 /// by the readings and the pose of its head's base.
 struct GivenColumns {

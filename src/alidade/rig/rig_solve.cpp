@@ -238,6 +238,29 @@ Eigen::MatrixXd RigSystem::information() const {
   return S;
 }
 
+namespace {
+
+/// What is known of scales that are estimated.
+void add_scale_priors(const RigProblem& problem, const RigState& state, RigSystem& system) {
+  if (!(problem.sigma_scale > 0.0)) return;
+  const double information = 1.0 / (problem.sigma_scale * problem.sigma_scale);
+  for (std::size_t h = 0; h < problem.free.size(); ++h) {
+    const Encoder& encoder = state.heads[h].head.encoder;
+    for (std::size_t k = 0; k < problem.free[h].size(); ++k) {
+      const int param = problem.free[h][k];
+      if (param != pan_scale_param && param != tilt_scale_param) continue;
+      const double scale = param == pan_scale_param ? encoder.pan_scale : encoder.tilt_scale;
+      const double off = scale - std::copysign(1.0, scale);  // its sign is detected
+      const int at = problem.first_free(h) + static_cast<int>(k);
+      system.U(at, at) += information;
+      system.g[at] += information * off;
+      system.cost += information * off * off;
+    }
+  }
+}
+
+}  // namespace
+
 std::optional<RigSystem> rig_system(const RigProblem& problem, const RigState& state, std::span<const double> weights) {
   const int num_free = problem.num_free();
   RigSystem system;
@@ -256,6 +279,7 @@ std::optional<RigSystem> rig_system(const RigProblem& problem, const RigState& s
     system.cost += weights[v] * system.views[v].chi2;
     system.num_residuals += static_cast<int>(at->r.size()) - 2;  // a correction brings a row and takes a parameter
   }
+  add_scale_priors(problem, state, system);
   return system;
 }
 

@@ -35,6 +35,7 @@ struct RigProblem {
   std::vector<std::vector<int>> free;  ///< Of each head: which of its parameters are estimated, ascending.
   double sigma_px = 1.0;
   double sigma_encoder_rad = 0.0;  ///< 0: readings are exact.
+  double sigma_scale = 0.0;        ///< Of a scale that is free, about one: a prior; 0: none.
 
   [[nodiscard]] int num_free() const;
   [[nodiscard]] bool is_free(std::size_t head, int param) const;

@@ -41,11 +41,13 @@ struct Work {
   Effort effort = {};
 };
 
-/// calibrate_rig() with these parameters estimated too.
+/// calibrate_rig() with these parameters estimated too. `sigma_free_scale`: what is known of an encoder's scale that is
+/// estimated; 0: nothing.
 [[nodiscard]] RigReport calibrated_with(std::span<const HeadView> views,
                                         std::span<const Eigen::Vector3d> points_in_board,
                                         const std::map<int, Camera>& cameras, const RigConfig& config,
-                                        const FreedParams& freed, const Progress& progress, const Effort& effort = {});
+                                        const FreedParams& freed, const Progress& progress, const Effort& effort = {},
+                                        double sigma_free_scale = 0.0);
 /// Causes indicated by the report's residuals, estimated too, one after another, as long as the views determine them.
 [[nodiscard]] RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
                                       std::span<const Eigen::Vector3d> points_in_board,

@@ -31,9 +31,27 @@ std::size_t jpeg_data_start(std::string_view bytes) {
   return std::min(at, bytes.size());
 }
 
+/// A PGM or PPM of fewer bytes than its header announces values: decoders would make room for them all.
+bool is_short_netpbm(std::string_view bytes) {
+  if (bytes.size() < 2 || bytes[0] != 'P' || std::string_view("2356").find(bytes[1]) == std::string_view::npos)
+    return false;
+  double values = bytes[1] == '3' || bytes[1] == '6' ? 3.0 : 1.0;
+  std::size_t at = 2;
+  for (int side = 0; side < 2; ++side) {
+    const auto is_digit = [&] { return bytes[at] >= '0' && bytes[at] <= '9'; };
+    for (; at < bytes.size() && !is_digit(); ++at)
+      if (bytes[at] == '#') at = std::min(bytes.find('\n', at), bytes.size() - 1);
+    double length = 0.0;
+    for (; at < bytes.size() && is_digit(); ++at) length = 10.0 * length + (bytes[at] - '0');
+    values *= length;
+  }
+  return static_cast<double>(bytes.size()) < values;
+}
+
 /// A JPEG has its end marker, and a PNG its IEND chunk: without it the file was cut off, and decoders would fill the
 /// rest with grey. What stands behind them (some phones append a video) is no matter.
 bool is_cut_off(std::string_view bytes) {
+  if (is_short_netpbm(bytes)) return true;
   if (starts_with(bytes, "\xFF\xD8\xFF")) {
     return bytes.find("\xFF\xD9", jpeg_data_start(bytes)) == std::string_view::npos;
   }

@@ -65,7 +65,7 @@ TEST(DecodePhoto, RefusesWhatIsNoImage) {
 }
 
 TEST(DecodePhoto, RefusesWhatIsCutOffAnywhere) {
-  for (const std::string ending : {".jpg", ".png"}) {
+  for (const std::string ending : {".jpg", ".png", ".pgm"}) {
     const std::string whole = encoded(ending, image(CV_8UC1));
     ASSERT_EQ(refusal(whole), "") << ending;
     for (const double share : {0.1, 0.5, 0.9}) {

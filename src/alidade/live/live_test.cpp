@@ -149,6 +149,7 @@ TEST(Feed, BrokenRequestsAreAnsweredAndNothingElseHappens) {
                                         R"({"op":"subscribe"})",
                                         R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]})",
                                         R"({"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]})",
+                                        R"({"op":"subscribe","subscriptions":[{"id":1e300,"channelId":1}]})",
                                         R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]})",
                                         R"({"op":"unsubscribe","subscriptionIds":[5]})",
                                         R"({"op":"advertise","channels":[]})",

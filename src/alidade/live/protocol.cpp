@@ -48,7 +48,7 @@ bool is_numeric(std::string_view name) {
 
 template <class Id>
 Id id_of(const Json& value) {
-  const auto id = value.get<std::int64_t>();
+  const auto id = value.is_number_integer() ? value.get<std::int64_t>() : -1;  // what has a fraction may be of any size
   if (id < 0 || static_cast<std::uint64_t>(id) > std::numeric_limits<std::uint32_t>::max())
     throw std::out_of_range("an id is a whole number of 32 bits");
   return static_cast<Id>(id);

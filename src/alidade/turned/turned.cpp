@@ -220,9 +220,7 @@ class TurnedRun {
              is_nearly_zero(radial_places[static_cast<std::size_t>(free_.lens_terms - 1)], scatter))
         drop(free_.lens_terms - 1, free_.decentred, scatter);
     }
-    scatter.cov.diagonal() += by_lens_;
-    scatter.cov(0, 1) += std::sqrt(by_lens_[0] * by_lens_[1]);  // a lens' terms move both alike
-    scatter.cov(1, 0) = scatter.cov(0, 1);
+    scatter.cov += by_lens_;
     report_.lens_terms = free_.lens_terms;
     report_.decentred = free_.decentred;
     note_fit();
@@ -267,14 +265,18 @@ class TurnedRun {
   /// With fewer terms. σ includes theirs, and the change of the answer when they are estimated: either may be the right
   /// lens.
   void drop(int lens_terms, bool decentred, ScatterCovariance& scatter) {
-    const TurnedCamera before = fit_.bundle.camera;
+    std::vector<int> dropped;
+    for (int i = lens_terms; i < free_.lens_terms; ++i) dropped.push_back(radial_places[static_cast<std::size_t>(i)]);
+    if (free_.decentred && !decentred) dropped.insert(dropped.end(), {decentring_place, decentring_place + 1});
+    const Eigen::MatrixXd with_dropped = scatter.cov(Eigen::all, dropped);
+    by_lens_ += with_dropped * inverse_symmetric(scatter.cov(dropped, dropped)) * with_dropped.transpose();
+    TurnedCamera moved = -fit_.bundle.camera;
     free_.lens_terms = lens_terms;
     free_.decentred = decentred;
     fit_ = fit_again(photos_, tree_, std::move(fit_), free_, progress_);
-    const ScatterCovariance less = scatter_covariance(fit_, progress_);
-    const TurnedCamera moved = fit_.bundle.camera - before;
-    by_lens_ += (scatter.cov - less.cov).diagonal().cwiseMax(0.0) + moved.cwiseAbs2();
-    scatter = less;
+    moved += fit_.bundle.camera;
+    by_lens_ += moved * moved.transpose();
+    scatter = scatter_covariance(fit_, progress_);
   }
 
   /// The camera in pixels; what a normalised unit of each parameter is.
@@ -371,7 +373,7 @@ class TurnedRun {
   std::vector<PhotoLink> links_;
   PhotoTree tree_;
   TurnedFit fit_;
-  TurnedCamera by_lens_ = TurnedCamera::Zero();  ///< Variances by the terms of the lens that are not estimated.
+  TurnedInformation by_lens_ = TurnedInformation::Zero();  ///< Covariance by the terms that are not estimated.
   std::size_t num_same_ = 0, num_agreeing_ = 0;
 };
 

@@ -234,6 +234,8 @@ async function aHeadThatFollowsIsSeen({browser, alidade}) {
   await close();
 }
 
+for (const body of [aRunMovesAndBecomesTheReport, whoJoinsSeesMarksAtOnce, aClientThatStopsReadingDoesNotSlowTheRun]) body.isTimed = true;
+
 export const tests = {
   'live: a run moves, space holds it, and it becomes the report': aRunMovesAndBecomesTheReport,
   'live: who joins sees marks at once; a killed run is crossed out': whoJoinsSeesMarksAtOnce,

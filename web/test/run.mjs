@@ -12,7 +12,8 @@ import * as captureReal from './capture_real.mjs';
 import * as live from './live.mjs';
 import * as trouble from './trouble.mjs';
 
-const [templateFile, givenAlidade, only = ''] = process.argv.slice(2); // only: tests whose names hold this; !this: that do not
+// only: tests whose names hold this; !this: that do not; several, by commas. What measures time has "timed:" before its name.
+const [templateFile, givenAlidade, only = ''] = process.argv.slice(2), words = only.split(',').filter(Boolean);
 const alidade = givenAlidade && resolve(givenAlidade); // it is run in other folders
 if (!hasBrowser()) {
   console.log(`web: skipped, there is no ${chromiumPath} (CHROMIUM names another)`);
@@ -21,7 +22,7 @@ if (!hasBrowser()) {
 const template = readFileSync(templateFile, 'utf8'), started = Date.now();
 const documents = {servo: {document: servoDocument()}, localize: {document: localizeDocument()}, reproduce: {document: reproduceDocument()}, 'rig, moving target': {document: movingDocument()}};
 const hasAlidade = Boolean(alidade && existsSync(alidade));
-const hasAll = !only || only.startsWith('!');
+const hasAll = words.every((word) => word.startsWith('!'));
 if (hasAlidade && hasAll) Object.assign(documents, realResults(alidade));
 else if (hasAll) console.log('web: without the executable only made-up documents are shown');
 
@@ -33,8 +34,9 @@ const context = {
   open: (url, options) => opened(browser, url, options),
   calibration: calibrateDocument,
 };
-async function test(name, body) {
-  if (hasAll ? only && name.includes(only.slice(1)) : !name.includes(only)) return;
+async function test(title, body) {
+  const name = body.isTimed ? `timed: ${title}` : title;
+  if (!words.every((word) => (word.startsWith('!') ? !name.includes(word.slice(1)) : name.includes(word)))) return;
   const start = Date.now();
   try {
     await body(context);

@@ -114,6 +114,8 @@ async function theTemplateIsSmall({template}) {
   assert.ok(!/src="http|href="http|@import|fetch\("http/.test(template));
 }
 
+for (const body of [aHundredThousandRowsOpen, fiveHundredPhotosOpenInTwoSeconds]) body.isTimed = true;
+
 export const tests = {
   'hostile texts stay texts': hostileTextsStayTexts,
   'missing parts are survived': missingPartsAreSurvived,

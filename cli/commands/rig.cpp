@@ -53,7 +53,7 @@ FieldList fields_of(RigArgs& args) {
 }
 
 ExitCode by_moving_target(const RigArgs& args, Run& run) {
-  const std::vector<int> ids = heads_in_events(args.views);
+  const std::vector<int> ids = heads_in_events(args.views, args.skip_bad);
   const std::vector<RigHead> heads = heads_with(read_cameras_by_head(args.cameras, ids, args.views));
   const EventsFile table = read_events(args.views, heads, {.skip_bad = args.skip_bad, .stands_still = true});
   TrueTrack truth;

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <sstream>
 #include <utility>
 
 namespace alidade {
@@ -140,6 +141,14 @@ std::optional<Number> parse_number(std::string_view text) {
   return value;
 }
 
+/// A whole number, also as programs write one that keep all numbers as floating ones: "7.0".
+std::optional<long> parse_whole(std::string_view text) {
+  if (const std::optional<long> value = parse_number<long>(text)) return value;
+  const std::optional<double> value = parse_number<double>(text);
+  if (!value || std::trunc(*value) != *value || !(std::abs(*value) <= largest_number)) return std::nullopt;
+  return static_cast<long>(*value);
+}
+
 /// True for digits that no double can hold, "1e999", which are a number all the same.
 bool is_out_of_range(std::string_view text) {
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
@@ -210,9 +219,24 @@ double csv_number(const std::string& cell, const CsvPlace& place) {
   throw InputError(what + " is not a number");
 }
 
-Csv Csv::read(const std::filesystem::path& file) { return parse(read_file(file), file.string()); }
+SkippedInput skipped_row(const std::string& file, std::string fault) {
+  std::size_t line = 0;
+  if (fault.starts_with(file + ":")) {
+    fault.erase(0, file.size() + 1);
+    const char* const begin = fault.data();
+    const char* const end = std::from_chars(begin, begin + fault.size(), line).ptr;
+    fault.erase(0, static_cast<std::size_t>(end - begin));
+    if (fault.starts_with(": ")) fault.erase(0, 2);
+  }
+  return {file, line, std::move(fault)};
+}
 
-Csv Csv::parse(std::string_view text, const std::string& name) {
+Csv Csv::read(const std::filesystem::path& file, bool skip_bad) {
+  return parse(read_file(file), file.string(), skip_bad);
+}
+
+Csv Csv::parse(std::string_view text, const std::string& name, bool skip_bad) {
+  if (skip_bad) return parse_skipping(text, name);
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark, as spreadsheets write it
   refuse_binary(text, name);
   Csv csv;
@@ -236,6 +260,22 @@ Csv Csv::parse(std::string_view text, const std::string& name) {
   }
   if (csv.header_.empty()) throw_empty(name);
   return csv;
+}
+
+Csv Csv::parse_skipping(std::string_view text, const std::string& name) {
+  std::istringstream in{std::string(text)};
+  CsvStream stream(in, name);
+  Csv csv = stream.empty_table();
+  for (;;) {
+    try {
+      std::optional<CsvRow> row = stream.next();
+      if (!row) return csv;
+      csv.rows_.push_back(std::move(row->cells));
+      csv.lines_.push_back(row->line);
+    } catch (const InputError& error) {
+      csv.skipped_.push_back(skipped_row(name, error.what()));
+    }
+  }
 }
 
 void Csv::require(std::span<const std::string> columns) const {
@@ -271,7 +311,7 @@ double Csv::positive(std::size_t row, const std::string& column) const {
 
 long Csv::integer(std::size_t row, const std::string& column, long low, long high) const {
   const std::string& cell = text(row, column);
-  const std::optional<long> value = parse_number<long>(cell);
+  const std::optional<long> value = parse_whole(cell);
   if (value && low <= *value && *value <= high) return *value;
   throw InputError(where(row, column) + ": " + in_quotes(cell) + " is not a whole number from " + std::to_string(low) +
                    " to " + std::to_string(high));

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "alidade/estimation/counts.h"
 #include "alidade/files/files.h"
 
 namespace alidade {
@@ -26,6 +27,9 @@ struct CsvPlace {
 /// A finite number, |x| ≤ 1e12. Throws `shots.csv:17: column 'range_m': 'nan' is not a finite number`.
 [[nodiscard]] double csv_number(const std::string& cell, const CsvPlace& place);
 
+/// A row's fault as its line and reason, freed of the "file:line: " that it begins with. Line 0: it names none.
+[[nodiscard]] SkippedInput skipped_row(const std::string& file, std::string fault);
+
 /// Text as a cell: quoted where it must be.
 [[nodiscard]] std::string csv_cell(const std::string& text);
 
@@ -37,13 +41,15 @@ struct CsvRow {
 /// A CSV file as read: header names and text cells. The ONE reader of tables; every fault names file, line and column.
 class Csv {
  public:
-  /// Throws InputError: unreadable, empty, no header, duplicate column, a row of another length, not text.
-  [[nodiscard]] static Csv read(const std::filesystem::path& file);
-  [[nodiscard]] static Csv parse(std::string_view text, const std::string& name);
+  /// Throws InputError: unreadable, empty, no header, duplicate column, a row of another length, not text. With
+  /// `skip_bad` such rows are left out and stand in skipped().
+  [[nodiscard]] static Csv read(const std::filesystem::path& file, bool skip_bad = false);
+  [[nodiscard]] static Csv parse(std::string_view text, const std::string& name, bool skip_bad = false);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t line(std::size_t row) const { return lines_.at(row); }  ///< Where the row begins.
   [[nodiscard]] std::size_t num_rows() const { return rows_.size(); }
+  [[nodiscard]] const std::vector<SkippedInput>& skipped() const { return skipped_; }
   [[nodiscard]] bool has(const std::string& column) const { return columns_.contains(column); }
   /// Throws InputError naming the first of these columns that is missing, and those that there are.
   void require(std::span<const std::string> columns) const;
@@ -57,7 +63,7 @@ class Csv {
   [[nodiscard]] double number(std::size_t row, const std::string& column) const;
   /// A number above zero.
   [[nodiscard]] double positive(std::size_t row, const std::string& column) const;
-  /// An integer in [low, high].
+  /// An integer in [low, high]; "7.0" is 7.
   [[nodiscard]] long integer(std::size_t row, const std::string& column, long low, long high) const;
   /// "file:line: column 'name'" of a cell, to begin a message with.
   [[nodiscard]] std::string where(std::size_t row, const std::string& column) const;
@@ -67,11 +73,14 @@ class Csv {
 
  private:
   friend class CsvStream;
+  [[nodiscard]] static Csv parse_skipping(std::string_view text, const std::string& name);
+
   std::string name_;
   std::vector<std::string> header_;
   std::map<std::string, std::size_t> columns_;
   std::vector<std::vector<std::string>> rows_;
   std::vector<std::size_t> lines_;
+  std::vector<SkippedInput> skipped_;
 };
 
 /// Such a table row by row, as it arrives: nothing is waited for beyond the end of the requested line.

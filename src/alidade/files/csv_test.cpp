@@ -85,6 +85,15 @@ TEST(Csv, IntegersHaveARange) {
   EXPECT_EQ(fault(3), "x.csv:5: column 'i': '99999999999999999999' is not a whole number from 0 to 10");
 }
 
+TEST(Csv, AWholeNumberMayBeWrittenAsAFloatingOne) {
+  const Csv csv = Csv::parse("i\n7.0\n1e1\n-0.0\n7.5\n1e13\nnan\n", "x.csv");
+  EXPECT_EQ(csv.integer(0, "i", 0, 10), 7) << "as pandas and numpy write a column of whole numbers with a gap";
+  EXPECT_EQ(csv.integer(1, "i", 0, 10), 10);
+  EXPECT_EQ(csv.integer(2, "i", 0, 10), 0);
+  for (const std::size_t row : {3u, 4u, 5u})
+    EXPECT_NE(fault_of([&] { (void)csv.integer(row, "i", 0, 1'000'000'000); }), "") << csv.text(row, "i");
+}
+
 TEST(Csv, NanosecondTimeStampsAreExact) {
   EXPECT_EQ(Csv::parse("t_ns\n1403636579763555584\n", "x.csv").integer(0, "t_ns", 0, 2'000'000'000'000'000'000),
             1403636579763555584);
@@ -105,6 +114,19 @@ TEST(Csv, WrongTablesAreRefusedByLine) {
       {"\xFF\xD8\xFF\xE0\x01JFIF", "shots.csv:1: is not a text file; a table of comma-separated values is needed"},
   };
   for (const auto& [text, message] : cases) EXPECT_EQ(fault_of_text(text), message);
+}
+
+TEST(Csv, WithSkipBadWhatIsNoRowIsNamedAndTheRestIsRead) {
+  const Csv csv = Csv::parse("a,b\n1,2\n3\n\n4,5,6\n7,\"8\"9\n10,11\n", "x.csv", /*skip_bad=*/true);
+  ASSERT_EQ(csv.num_rows(), 2u);
+  EXPECT_EQ(csv.number(1, "b"), 11.0);
+  EXPECT_EQ(csv.line(1), 7u);
+  std::vector<std::string> named;
+  for (const SkippedInput& each : csv.skipped()) named.push_back(std::to_string(each.line) + " " + each.reason);
+  EXPECT_EQ(named,
+            (std::vector<std::string>{"3 has 1 cell, the header has 2", "4 a blank line inside the table; remove it",
+                                      "5 has 3 cells, the header has 2", "6 text after a closing quote"}));
+  EXPECT_NE(fault_of([] { (void)Csv::parse("a,a\n1,2\n", "x.csv", true); }), "") << "a header must be right";
 }
 
 TEST(Csv, AMissingColumnIsNamedWithThoseThatAreThere) {

@@ -46,7 +46,7 @@ std::string corners_csv(std::span<const BoardView> views) {
 
 std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points,
                                     std::vector<SkippedInput>* skipped) {
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, skipped != nullptr);
   const std::string u = csv.has("u_px") ? "u_px" : "u", v = csv.has("v_px") ? "v_px" : "v";
   // One σ without the other is a mistake, and named as such.
   const auto is_given = [&](std::size_t row, const std::string& column) {

@@ -21,18 +21,19 @@ std::string cells_of(const Belief<6>& belief) {
 
 }  // namespace
 
-std::vector<int> heads_in_events(const std::filesystem::path& file) {
-  const Csv csv = Csv::read(file);
+std::vector<int> heads_in_events(const std::filesystem::path& file, bool skip_bad) {
+  const Csv csv = Csv::read(file, skip_bad);
   if (!csv.has("head")) throw InputError(csv.name() + ": has no column 'head'");
   std::set<int> ids;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row)
-    ids.insert(static_cast<int>(csv.integer(row, "head", 0, 1000000)));
+  std::vector<SkippedInput> named_later;
+  for_each_row(csv, skip_bad, named_later,
+               [&](std::size_t row) { ids.insert(static_cast<int>(csv.integer(row, "head", 0, 1000000))); });
   return {ids.begin(), ids.end()};
 }
 
 EventsFile read_events(const std::filesystem::path& file, std::span<const RigHead> heads,
                        const EventsOptions& options) {
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, options.skip_bad);
   EventRows rows(csv, heads, options.stands_still);
   EventsFile read;
   for_each_row(csv, options.skip_bad, read.skipped,

@@ -26,7 +26,7 @@ struct EventsOptions {
 };
 
 /// Ids in column `head`, in order of size.
-[[nodiscard]] std::vector<int> heads_in_events(const std::filesystem::path& file);
+[[nodiscard]] std::vector<int> heads_in_events(const std::filesystem::path& file, bool skip_bad = false);
 
 /// Reads `t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px`: `head` is an id of the rig, angles are those at
 /// capture (also `pan_rad_at_capture`), `t_arrival_s` may be omitted. `du_px,dv_px` in place of the pixel are offsets

@@ -68,7 +68,7 @@ Eigen::Quaterniond imu_rotation(const detail::Fields& fields) {
 
 std::vector<ImuReading> read_imu(const std::filesystem::path& file, bool skip_bad, std::vector<SkippedInput>* skipped,
                                  std::int64_t origin_ns) {
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, skip_bad);
   const bool is_euroc = csv.has(euroc_columns[0]);
   const ImuColumns& columns = is_euroc ? euroc_columns : imu_columns;
   csv.require(columns);

@@ -59,7 +59,7 @@ void add_named(std::vector<SkippedInput> named, std::vector<SkippedInput>* skipp
 
 std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file, bool skip_bad,
                                             std::vector<SkippedInput>* skipped) {
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, skip_bad);
   csv.require(std::array<std::string, 2>{"t_s", "depth_m"});
   std::vector<DepthReading> readings;
   std::vector<SkippedInput> named;
@@ -77,7 +77,7 @@ std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file, b
 
 std::vector<RangeReading> read_ranges(const std::filesystem::path& file, bool skip_bad,
                                       std::vector<SkippedInput>* skipped) {
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, skip_bad);
   csv.require(std::array<std::string, 2>{"t_s", "range_m"});
   std::vector<RangeReading> readings;
   std::vector<SkippedInput> named;
@@ -92,7 +92,7 @@ std::vector<RangeReading> read_ranges(const std::filesystem::path& file, bool sk
 
 std::vector<OdometryReading> read_odometry(const std::filesystem::path& file, bool skip_bad,
                                            std::vector<SkippedInput>* skipped) {
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, skip_bad);
   csv.require(std::array<std::string, 3>{"t_s", "x_m", "y_m"});
   std::vector<OdometryReading> readings;
   std::vector<SkippedInput> named;

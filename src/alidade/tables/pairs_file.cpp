@@ -94,7 +94,7 @@ class MatchesSoFar {
 
 PairsFile read_pairs(const std::filesystem::path& file, bool skip_bad) {
   constexpr std::size_t max_frames = 2000;
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, skip_bad);
   const PairColumns names = pair_columns_in(csv);
   MatchesSoFar matches;
   PairsFile read;

@@ -37,20 +37,6 @@ RotationLog layout_of(const RotationLogColumns& columns) {
   return layout;
 }
 
-/// "log.csv:17: column 't': …" as line and reason.
-SkippedInput skipped_by(const InputError& error, const std::string& file) {
-  std::string reason = error.what();
-  std::size_t line = 0;
-  if (reason.starts_with(file + ":")) {
-    reason.erase(0, file.size() + 1);
-    std::size_t digits = 0;
-    while (digits < reason.size() && reason[digits] >= '0' && reason[digits] <= '9') ++digits;
-    if (digits > 0) line = std::stoul(reason.substr(0, digits));
-    if (reason.compare(digits, 2, ": ") == 0) reason.erase(0, digits + 2);
-  }
-  return {file, line, reason};
-}
-
 void check_log(const RotationLog& log, const std::string& name) {
   if (log.rows.size() < 2)
     throw InputError(fmt::format("{}: has {} usable row{}; at least 2 are needed", name, log.rows.size(),
@@ -108,7 +94,7 @@ std::optional<RotationLogEntry> RotationLogStream::next() {
       entry = next_checked();
     } catch (const InputError& error) {
       if (!options_.skip_bad) throw;
-      skipped_.push_back(skipped_by(error, table_.name()));
+      skipped_.push_back(skipped_row(table_.name(), error.what()));
       continue;
     }
     if (entry && last_ && is_repeated(*entry, *last_)) {

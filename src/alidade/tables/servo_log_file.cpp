@@ -11,7 +11,7 @@
 
 namespace alidade {
 ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {
-  const Csv csv = Csv::read(file);
+  const Csv csv = Csv::read(file, skip_bad);
   const bool is_deg = csv.has("angle_deg");
   if (is_deg && csv.has("angle_rad")) throw InputError(csv.name() + ": has both 'angle_rad' and 'angle_deg'");
   const std::string angle = is_deg ? "angle_deg" : "angle_rad";

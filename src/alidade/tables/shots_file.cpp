@@ -127,7 +127,7 @@ std::string number(double value) { return fmt::format("{:.9g}", value); }
 }  // namespace
 
 ShotsFile read_shots(const std::filesystem::path& file, const ShotsOptions& options) {
-  return read_shots(Csv::read(file), options);
+  return read_shots(Csv::read(file, options.skip_bad), options);
 }
 
 ShotsFile read_shots(const Csv& csv, const ShotsOptions& options) {

@@ -107,7 +107,7 @@ void add_row(const Csv& csv, std::size_t row, const ViewColumns& columns, int nu
 }  // namespace
 
 ViewsFile read_views(const std::filesystem::path& file, const ViewsOptions& options) {
-  return read_views(Csv::read(file), options);
+  return read_views(Csv::read(file, options.skip_bad), options);
 }
 
 ViewsFile read_views(const Csv& csv, const ViewsOptions& options) {

@@ -93,16 +93,16 @@ EventsStream::EventsStream(std::istream& in, const std::string& name, std::span<
 
 std::optional<TargetObservation> EventsStream::next() {
   for (;;) {
-    std::optional<CsvRow> row = table_.next();
-    if (!row) break;
-    row_.set_only_row(std::move(*row));
     try {
+      std::optional<CsvRow> row = table_.next();
+      if (!row) break;
+      row_.set_only_row(std::move(*row));
       const TargetObservation observation = rows_.read(row_, 0);
       has_rows_ = true;
       return observation;
     } catch (const InputError& error) {
       if (!skips_bad_) throw;
-      skipped_.push_back(skipped_row(row_, 0, error.what()));
+      skipped_.push_back(skipped_row(table_.name(), error.what()));
     }
   }
   if (!has_rows_) throw InputError(table_.name() + ": has no events; at least one row is needed");

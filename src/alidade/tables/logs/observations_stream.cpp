@@ -96,14 +96,14 @@ ObservationsStream::ObservationsStream(std::istream& in, const std::string& name
 
 /// False at the end of the input.
 bool ObservationsStream::read_row() {
-  std::optional<CsvRow> row = table_.next();
-  if (!row) return false;
-  row_.set_only_row(std::move(*row));
   try {
+    std::optional<CsvRow> row = table_.next();
+    if (!row) return false;
+    row_.set_only_row(std::move(*row));
     rows_.read(row_, 0);
   } catch (const InputError& error) {
     if (!skips_bad_) throw;
-    skipped_.push_back(skipped_row(row_, 0, error.what()));
+    skipped_.push_back(skipped_row(table_.name(), error.what()));
   }
   return true;
 }

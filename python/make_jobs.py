@@ -157,6 +157,9 @@ def write(file, title, functions):
 
 
 commands = {each["name"]: each for each in _alidade.commands()}
+for each in commands["rig"]["options"]:  # the one command that takes several; `camera` is its other name
+    if each["name"] == "camera":
+        each["name"] = "cameras"
 write("jobs.py", "The jobs, a function each.", [calibrate(commands["calibrate"]), *(job(commands[name], name) for name in JOBS)])
 for group, title in (("plan", "What to do next, before it is done."), ("simulate", "Data with known truth."),
                      ("study", "Campaigns of simulated trials: is σ what it says?")):

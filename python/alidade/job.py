@@ -30,7 +30,7 @@ Options = dict[str, tuple[str, bool, bool, str]]
 #: Columns of a table that may name files, beside it or where the program runs.
 PHOTO_COLUMNS = ("photo", "photo_off")
 #: The file of a result that a keyword takes, where it is not called like it.
-FILE_OF = {"beam": "rangefinder"}
+FILE_OF = {"beam": "rangefinder", "cameras": "camera"}
 #: What OpenCV's users and the command line give beside the board; here it is the board's own.
 BOARD_FIELDS = ("square_m", "square", "square_size", "marker_m", "marker", "board_kind", "dictionary")
 OF_THE_BOARD = ': it is the board\'s, as in board=al.Board("9x6", square_m=0.025)'

@@ -129,10 +129,26 @@ class Tables(abc.Mapping[str, "np.ndarray[Any, Any]"]):
                 text = self._source.file(self._files[name]).decode()
                 self._made[name] = of_tum(text) if self._files[name].endswith(".tum") else of_csv(text)
             elif name in self._source.tables:
-                self._made[name] = structured(self._source.table(name))
+                self._made[name] = self._in_full(name, structured(self._source.table(name)))
             else:
                 raise KeyError(f"{name}; there are {', '.join(self)}")
         return self._made[name]
+
+    def _in_full(self, name: str, table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """The document's table, whose numbers are rounded for the page, with those of the file of its name."""
+        if name + ".csv" not in self._source.files:
+            return table
+        exact = of_csv(self._source.file(name + ".csv").decode())
+        rounded_by = 0.006
+        shared = [column for column in exact.dtype.names or () if column in table.dtype.names and exact[column].dtype.kind == "f"]
+        if len(exact) != len(table) or any(np.nanmax(abs(exact[each] - table[each]), initial=0.0) > rounded_by for each in shared):
+            return table  # of other rows
+        more = [column for column in exact.dtype.names if column not in table.dtype.names]
+        columns = [(column, table[column]) for column in table.dtype.names] + [(column, exact[column]) for column in more]
+        full = structured(columns)
+        for column in shared:
+            full[column] = exact[column]
+        return full
 
     def __iter__(self) -> abc.Iterator[str]:
         return iter([*self._source.tables, *(name for name in self._files if name not in self._source.tables)])
@@ -301,7 +317,7 @@ class Result:
             return self._source.all_files
         with tempfile.TemporaryDirectory(prefix="alidade-") as folder:
             self.save(folder)
-            return _files_in(pathlib.Path(folder))
+            return _files_beside(pathlib.Path(folder) / "result.json")
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and name in self.estimate:
@@ -371,16 +387,17 @@ class Report:
         return f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="800" frameborder="0"></iframe>'
 
 
-def _files_in(folder: pathlib.Path) -> dict[str, bytes]:
+def _files_beside(result: pathlib.Path) -> dict[str, bytes]:
     """A result's files by name: result.json first, then those it names, then the page."""
-    result = folder / "result.json"
     if not result.is_file():
-        raise ValueError(f"{result}: there is no such file")
+        raise ValueError("there is no such file")
     files = {"result.json": result.read_bytes()}
-    named = json.loads(files["result.json"]).get("files", [])
-    for name in [*named, "report.html"]:
-        if (folder / name).is_file():
-            files[name] = (folder / name).read_bytes()
+    document = json.loads(files["result.json"])
+    if "verdict" not in document:
+        raise ValueError("it has no verdict")
+    for name in [*document.get("files", []), "report.html"]:
+        if (result.parent / name).is_file():
+            files[name] = (result.parent / name).read_bytes()
     return files
 
 
@@ -390,11 +407,12 @@ def _of_files(files: dict[str, bytes], lines: list[str], camera: Camera | None =
 
 
 def read_result(path: str | os.PathLike[str]) -> Result:
-    """The result of an earlier run, the command's or Python's: its folder, or the result.json in it."""
-    folder = pathlib.Path(path)
-    folder = folder if folder.is_dir() else folder.parent
+    """The result of an earlier run, the command's or Python's: its folder, or the result.json in it, by whatever name."""
+    result = pathlib.Path(path)
+    if result.is_dir():
+        result = result / "result.json"
     try:
-        files = _files_in(folder)
-    except (ValueError, AttributeError, OSError) as error:
+        files = _files_beside(result)
+    except (ValueError, AttributeError, TypeError, OSError) as error:
         raise ValueError(f"{path}: is no result of alidade: {error}") from None
     return _of_files(files, [])

@@ -150,6 +150,10 @@ class FromCorners(unittest.TestCase):
         import pandas
         frame = pandas.DataFrame(self.result.tables["corners"])
         self.assertEqual(len(frame), self.corners.size // 2)
+        given = self.corners.reshape(-1, 2)
+        np.testing.assert_allclose(np.column_stack([frame["u_px"], frame["v_px"]]), given, rtol=0, atol=1e-9)
+        again = al.calibrate(corners=self.result.tables["corners"], size=SIZE, board=BOARD)
+        np.testing.assert_allclose(again.camera.parameters, self.result.camera.parameters, rtol=1e-6)
         self.assertEqual(len(self.result.tables["poses"]), len(self.corners))
         self.assertIn("sigma_px", self.result.grids["sigma_working"])
         again = pickle.loads(pickle.dumps(self.result))
@@ -220,8 +224,16 @@ class Photos(InFolder):
         document = json.loads(theirs)
         self.assertEqual(self.result.estimate, document["estimate"])
         self.assertEqual(self.result.verdict.sentence, document["verdict"]["sentence"])
+        renamed = by_command / "renamed.json"
+        renamed.write_text(theirs)
+        self.assertEqual(al.read_result(renamed).estimate, self.result.estimate)
+        for wrong in ("camera.yaml", "corners.csv", "absent.json"):  # beside a result, and none
+            with self.assertRaisesRegex(ValueError, wrong):
+                al.read_result(by_command / wrong)
         for name, table in document["data"].items():
-            for column in self.result.tables[name].dtype.names:
+            for column in set(self.result.tables[name].dtype.names) & set(table):
+                if name == "corners" and column in ("u_px", "v_px", "sigma_u_px", "sigma_v_px", "corr_uv"):
+                    continue  # rounded in the document
                 expected = [np.nan if each is None else each for each in table[column]]
                 np.testing.assert_array_equal(self.result.tables[name][column], np.array(expected), f"{name}.{column}")
         read.save(self.folder / "c")

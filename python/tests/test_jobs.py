@@ -86,9 +86,15 @@ class Jobs(InFolder):
         self.assertEqual(result.direction.shape, (3,))
         views = self.folder / "views"
         al.simulate.rig().save(views)
-        rig = al.rig(views / "views.csv", camera=[views / "camera_1.yaml", views / "camera_2.yaml"],
-                     board=al.Board("9x6", square_m=0.025))
+        cameras = [views / "camera_1.yaml", views / "camera_2.yaml"]
+        rig = al.rig(views / "views.csv", cameras=cameras, board=al.Board("9x6", square_m=0.025))
         self.assertIn("rig.yaml", rig.files)
+        numbers = np.genfromtxt(views / "views.csv", delimiter=",", names=True)  # float64, heads and corners as well
+        for table, word in ((numbers, "cameras"), (views / "views.csv", "camera")):
+            same = al.rig(table, board=al.Board("9x6", square_m=0.025), **{word: [al.Camera.read(each) for each in cameras]})
+            self.assertEqual(same.estimate, rig.estimate)
+        with self.assertRaises(TypeError):
+            al.rig(views / "views.csv", cameras=cameras, camera=cameras, board=al.Board("9x6", square_m=0.025))
 
     def test_images_take_the_place_of_files(self):
         import cv2

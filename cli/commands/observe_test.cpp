@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "alidade/files/files.h"
 #include "alidade/testing/command_test.h"
@@ -34,6 +35,36 @@ TEST(Observe, RefusesByNameWhatTheMotionDoesNotDetermine) {
   expect("tilt", "tilt only: fx cannot be determined; pan the camera as well");
   expect("roll", "roll only");
   expect("still", "does not turn");
+}
+
+/// Tables up to 20 000 rows are whole; of longer ones all rows are in a file beside.
+TEST(Observe, TheResultHoldsALogOfThousandsOfRows) {
+  const testing::TemporaryFolder folder;
+  const std::string log = (folder.path() / "log").string(), out = (folder.path() / "out").string();
+  ASSERT_EQ(testing::run_program({ALIDADE_EXECUTABLE, "simulate", "rotation", "--duration", "170", "--out", log}).code,
+            0);
+  const Outcome outcome =
+      testing::run_program({ALIDADE_EXECUTABLE, "observe", log + "/log.csv", "--size", "780x582", "--out", out});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto data = nlohmann::json::parse(read_file(out + "/result.json"))["data"];
+  EXPECT_EQ(data["steps"]["t_s"].size(), 5101u);
+  EXPECT_FALSE(data["steps"].contains("thinned"));
+  const auto& points = data["points"];
+  EXPECT_EQ(points["thinned"]["from"], 4 * 5101);
+  const std::vector<double> kept = points["residual_u_px"];
+  EXPECT_LE(kept.size(), 20'000u);
+  double largest = 0.0;
+  std::istringstream rows(read_file(out + "/points_all.csv"));
+  std::string row;
+  std::getline(rows, row);
+  ASSERT_EQ(row, "step,point,u_px,v_px,residual_u_px,residual_v_px");
+  std::size_t count = 0;
+  for (; std::getline(rows, row); ++count) {
+    for (int skip = 0; skip < 4; ++skip) row.erase(0, row.find(',') + 1);
+    largest = std::max(largest, std::stod(row));
+  }
+  EXPECT_EQ(count, 4u * 5101u);
+  EXPECT_EQ(*std::max_element(kept.begin(), kept.end()), largest) << "extremes stay";
 }
 
 TEST(Observe, SaysWhatIsWrongWithItsInput) {

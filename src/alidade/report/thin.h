@@ -6,7 +6,7 @@
 namespace alidade::report {
 
 /// Rows of a table of time steps that a page holds; the CSV beside it has all.
-inline constexpr std::size_t max_step_rows = 4000;
+inline constexpr std::size_t max_step_rows = 20'000;
 
 /// Rows of a long table to keep, in order, about `most` of them: the first and the last, all with `must_keep` (one a
 /// row, or empty), and of each of equal buckets the rows where a column is smallest and largest. All rows where there

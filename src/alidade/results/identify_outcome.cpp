@@ -6,8 +6,6 @@
 #include <span>
 
 #include "alidade/geometry/degree.h"
-#include "alidade/report/thin.h"
-#include "alidade/results/thin_tables.h"
 #include "alidade/tables/servo_log_file.h"
 
 namespace alidade {
@@ -18,7 +16,7 @@ using Numbers = std::vector<double>;
 void fill_response(const Identification& identified, ResultDocument& document) {
   const std::vector<ServoSample>& log = identified.log;
   Numbers t, command, measured, model, residual;
-  for (const std::size_t at : report::thinned_rows(log.size(), {identified.residual_rad}, {}, report::max_step_rows)) {
+  for (std::size_t at = 0; at < log.size(); ++at) {
     t.push_back(log[at].t_s);
     command.push_back(log[at].command);
     measured.push_back(log[at].angle_rad);
@@ -31,7 +29,6 @@ void fill_response(const Identification& identified, ResultDocument& document) {
                             {"measured_rad", rounded(std::move(measured), 7)},
                             {"model_rad", rounded(std::move(model), 7)},
                             {"residual_rad", rounded(std::move(residual), 7)}}});
-  record_steps_kept(document.data.back(), log.size(), "");
 }
 
 /// What was freed beside a lag, and the encoder's own step.

@@ -80,7 +80,7 @@ DataTable control_table(std::span<const RigHead> rig, std::span<const ServoRow> 
   for (std::size_t k = 0; k < num_columns; ++k)
     table.columns.emplace_back(columns[k], rounded(std::move(cells[k]), k < 8 ? 6 : 4));
   table.columns.emplace_back("event", events);
-  record_steps_kept(table, rows.size(), "servo.csv");
+  record_steps_kept(table, rows.size(), "", "servo.csv");
   return table;
 }
 

@@ -118,6 +118,12 @@ std::string table_csv(const DataTable& table) {
   return csv;
 }
 
+std::string how_thinned(const std::string& extremes_of, const std::string& besides, const std::string& all_in) {
+  std::string how = "of equal buckets of rows the first";
+  if (!extremes_of.empty()) how += " and those with the smallest and the largest " + extremes_of;
+  return how + "; besides " + besides + "; all rows are in " + all_in;
+}
+
 void thin_table(DataTable& table, std::size_t most) {
   const std::size_t count = num_rows(table);
   std::vector<bool> flagged(count, false);
@@ -138,19 +144,15 @@ void thin_table(DataTable& table, std::size_t most) {
     table.thinned->to = rows.size();
     return;
   }
-  std::string how = "of equal buckets of rows the first";
-  if (!names.empty()) how += " and those with the smallest and the largest " + names;
-  how += "; besides the rows that were rejected or have an event; all rows are in " + table.name + "_all.csv";
-  table.thinned = Thinned{count, rows.size(), std::move(how)};
+  table.thinned = Thinned{count, rows.size(),
+                          how_thinned(names, "the rows that were rejected or have an event", table.name + "_all.csv")};
 }
 
 }  // namespace
 
-void record_steps_kept(DataTable& table, std::size_t from, const std::string& all_in) {
+void record_steps_kept(DataTable& table, std::size_t from, const std::string& extremes_of, const std::string& all_in) {
   const std::size_t to = num_rows(table);
-  if (to == from) return;
-  table.thinned =
-      Thinned{from, to, "evenly spread, and those with an event" + (all_in.empty() ? "" : "; all are in " + all_in)};
+  if (to != from) table.thinned = Thinned{from, to, how_thinned(extremes_of, "the rows with an event", all_in)};
 }
 
 std::string result_text_of_size(ResultDocument& document,

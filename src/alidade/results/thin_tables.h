@@ -17,8 +17,9 @@ inline constexpr std::size_t max_table_rows = 20'000, max_corner_rows = 60'000, 
 [[nodiscard]] std::string result_text_of_size(ResultDocument& document,
                                               const std::function<void(std::string, std::string)>& add_file);
 
-/// Records that a table of steps holds only some of so many: evenly spread ones, and those with an event. `all_in`: the
-/// file that has them all, if one has. Nothing to record where it holds all.
-void record_steps_kept(DataTable& table, std::size_t from, const std::string& all_in);
+/// Records that a table of steps holds only some of so many, as thinned_rows() keeps them: of equal buckets the first
+/// and those with the extremes of `extremes_of` (a column; empty: of none), and those with an event. `all_in`: the file
+/// that has them all. Nothing to record where the table does.
+void record_steps_kept(DataTable& table, std::size_t from, const std::string& extremes_of, const std::string& all_in);
 
 }  // namespace alidade

@@ -6,9 +6,7 @@
 #include <cmath>
 
 #include "alidade/detect/video_observations.h"
-#include "alidade/report/thin.h"
 #include "alidade/results/documents/track_document.h"
-#include "alidade/results/thin_tables.h"
 #include "alidade/tables/events_file.h"
 
 namespace alidade {
@@ -76,14 +74,11 @@ void fill_target_frames(std::span<const TargetFrame> frames, std::span<const Rig
   std::vector<std::size_t> num_frames(heads.size()), num_seen(heads.size());
   Numbers t, head, number, u, v, sigma, score;
   std::vector<std::string> reason;
-  std::vector<bool> lost;
   for (const TargetFrame& frame : frames) {
     ++num_frames[frame.head];
     num_seen[frame.head] += frame.seen.found() ? 1U : 0U;
-    lost.push_back(!frame.seen.found());
   }
-  for (const std::size_t row : report::thinned_rows(frames.size(), {}, lost, report::max_step_rows)) {
-    const TargetFrame& frame = frames[row];
+  for (const TargetFrame& frame : frames) {
     const auto if_found = [&](double value) { return frame.seen.found() ? value : missing_value; };
     t.push_back(frame.t_s);
     head.push_back(heads[frame.head].head.id);
@@ -109,7 +104,6 @@ void fill_target_frames(std::span<const TargetFrame> frames, std::span<const Rig
   table.columns.emplace_back("sigma_px", rounded(std::move(sigma), 4));
   table.columns.emplace_back("score", rounded(std::move(score), 4));
   table.columns.emplace_back("reason", reason);
-  record_steps_kept(table, frames.size(), "");
   document.data.push_back(std::move(table));
 }
 

@@ -131,7 +131,7 @@ export class SeriesPlot {
     return {
       width: Math.max(60, this.box.clientWidth), height: look.height,
       legend: {show: false},
-      padding: [8, 12, hasX ? 0 : 6, 0],
+      padding: [8, 18, hasX ? 0 : 6, 0],
       cursor: {drag: {x: true, y: false}, focus: {prox: 1e6}, points: {size: 7},
         ...(look.syncKey === '' ? {} : {sync: {key: look.syncKey ?? 'time'}})},
       scales: {x: {time: false}, y: {distr: look.isLog ? 3 : 1, range: (_, low, high) => this.rangeOf(low, high)}},

@@ -41,7 +41,7 @@ DataTable follow_table(std::span<const FollowedFrame> frames) {
   DataTable table{"follow", {{"t_s", rounded(std::move(t), 6)}}};
   for (std::size_t k = 0; k < cells.size(); ++k)
     table.columns.emplace_back(follow_columns[k], rounded(std::move(cells[k]), k < 2 ? 4 : 7));
-  record_steps_kept(table, frames.size(), "follow.csv");
+  record_steps_kept(table, frames.size(), "", "follow.csv");
   return table;
 }
 

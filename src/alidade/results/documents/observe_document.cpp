@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "alidade/formats/camera_json.h"
 #include "alidade/observe/solve/solve.h"
@@ -15,13 +14,16 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-constexpr std::size_t max_steps = 2000, max_pixels = 6000;  // the page holds them; intrinsics.csv has all rows
-
-/// Which rows stand in the table: evenly spread, and those with an event.
+/// Which rows stand in the table: intrinsics.csv has all.
 std::vector<bool> kept_rows(const ObserveReport& report) {
   std::vector<bool> has_event, kept(report.steps.size(), false);
-  for (const IntrinsicsEstimate& step : report.steps) has_event.push_back(step.event != ObserveEvent::none);
-  for (const std::size_t row : report::thinned_rows(kept.size(), {}, has_event, max_steps)) kept[row] = true;
+  Numbers nis;
+  for (const IntrinsicsEstimate& step : report.steps) {
+    has_event.push_back(step.event != ObserveEvent::none);
+    nis.push_back(step.nis_dof > 0 ? step.nis / step.nis_dof : not_seen);
+  }
+  for (const std::size_t row : report::thinned_rows(kept.size(), {nis}, has_event, report::max_step_rows))
+    kept[row] = true;
   return kept;
 }
 
@@ -90,24 +92,15 @@ DataTable steps_table(const ObserveReport& report) {
     columns.add(step);
   }
   DataTable table = columns.table();
-  record_steps_kept(table, log.rows.size(), "intrinsics.csv");
+  record_steps_kept(table, log.rows.size(), "nis per degree of freedom", "intrinsics.csv");
   return table;
-}
-
-/// Every so many of so many: a step that meets every point in turn.
-std::size_t stride(std::size_t count, std::size_t num_points) {
-  std::size_t every = (count + max_pixels - 1) / max_pixels;
-  while (every > 1 && std::gcd(every, num_points) != 1) ++every;
-  return std::max<std::size_t>(1, every);
 }
 
 /// Residuals, prediction minus pixel. `step` is a row of the log.
 DataTable points_table(const ObserveReport& report) {
   std::vector<int> step, point;
   Numbers u, v, du, dv;
-  const std::size_t every = stride(report.residuals.size(), std::max<std::size_t>(1, report.log.num_points));
-  for (std::size_t i = 0; i < report.residuals.size(); i += every) {
-    const ObserveResidual& seen = report.residuals[i];
+  for (const ObserveResidual& seen : report.residuals) {
     step.push_back(seen.row);
     point.push_back(seen.point);
     u.push_back(seen.px.x());
@@ -301,10 +294,7 @@ void fill_observation(const ObserveReport& report, ResultDocument& document) {
     }
   }
   if (report.steps.size() == log.rows.size() && !log.rows.empty()) document.data.push_back(steps_table(report));
-  if (!report.residuals.empty()) {
-    document.data.push_back(points_table(report));
-    record_steps_kept(document.data.back(), report.residuals.size(), "");
-  }
+  if (!report.residuals.empty()) document.data.push_back(points_table(report));
   if (!report.photos.empty()) fill_photos(report, document);
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "alidade/report/thin.h"
 #include "alidade/results/documents/number_columns.h"
@@ -18,14 +19,16 @@ constexpr std::array<const char*, 3> axes{"x", "y", "z"};
 constexpr std::array<const char*, 6> cov_names{"xx", "xy", "xz", "yy", "yz", "zz"};
 constexpr std::array<std::pair<int, int>, 6> cov_places{{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
 
-/// Which rows stand in the tables: evenly spread, and those with something to say.
+/// Which rows stand in the table of steps: track.csv has all.
 std::vector<std::size_t> kept_rows(const TrackReport& report) {
   std::vector<bool> has_event;
+  Numbers nis;
   for (const TrackStep& step : report.steps) {
+    nis.push_back(step.has_innovation ? step.innovation.nis : missing_value);
     has_event.push_back(step.event != TrackEvent::none && step.event != TrackEvent::one_head &&
                         step.event != TrackEvent::waiting);
   }
-  return report::thinned_rows(report.steps.size(), {}, has_event, report::max_step_rows);
+  return report::thinned_rows(report.steps.size(), {nis}, has_event, report::max_step_rows);
 }
 
 using ByAxis = std::array<Numbers, 3>;
@@ -125,9 +128,10 @@ void add_track_tables(std::span<const TargetObservation> observations, std::span
                       const TrackReport& report, const TrueTrack& truth, ResultDocument& document) {
   const std::vector<std::size_t> rows = kept_rows(report);
   document.data.push_back(steps_table(report, truth, rows));
-  record_steps_kept(document.data.back(), report.steps.size(), "track.csv");
-  document.data.push_back(measurements_table(observations, heads, report, rows));
-  record_steps_kept(document.data.back(), report.steps.size(), "");
+  record_steps_kept(document.data.back(), report.steps.size(), "nis", "track.csv");
+  std::vector<std::size_t> all(report.steps.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  document.data.push_back(measurements_table(observations, heads, report, all));
 }
 
 DataTable track_row(const TargetObservation& observation, std::span<const RigHead> heads, const TrackStep& step,

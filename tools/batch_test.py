@@ -115,6 +115,11 @@ class Batch(unittest.TestCase):
         self.assertEqual(running.wait(), 0)
         self.assertEqual([int(row["exit_code"]) for row in self.table()], [0] * CAMERAS + [3, 2, 2, 2])
 
+    def test_a_row_that_says_no_command_fails_alone(self):
+        (self.folder / "jobs.csv").write_text('arguments,camera\n"",x\n"camera show none.yaml",y\n"observe \'z",z\n')
+        self.run_batch(code=4)
+        self.assertEqual([int(row["exit_code"]) for row in self.table()], [2, 3, 2])
+
     def test_a_table_that_cannot_be_is_refused(self):
         for text, said in (("camera,size\na,1x1\n", "arguments"), ("arguments\n", "no rows"), ('arguments\n"observe \'x"\n', "jobs.csv:2"), ('arguments,camera\n"",x\n', "empty")):
             (self.folder / "jobs.csv").write_text(text)

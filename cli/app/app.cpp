@@ -63,6 +63,7 @@ void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& o
 
 /// Finds out before the work, not after it, that the results cannot be written; leaves nothing there.
 void require_place(const CommonOptions& options) {
+  if (options.out.empty()) throw UsageError("--out: is empty; a folder is needed");
   if (!options.leaves_results) return;
   try {
     const FolderSwap tried(options.out);

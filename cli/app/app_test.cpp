@@ -138,6 +138,12 @@ TEST(App, AnOutThatIsAFileIsBadInputBeforeAnyWork) {
   EXPECT_THAT(outcome.err, is_fault(file + ": is a file, not a folder; give another --out"));
 }
 
+TEST(App, AnEmptyOutIsWrongUsage) {
+  const Outcome outcome = outcome_of({"work", "--out", ""}, throwing([] { throw std::logic_error("worked"); }));
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, is_fault("--out: is empty; a folder is needed"));
+}
+
 TEST(App, ARunLeavesItsFilesAndTellsAPerson) {
   const TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string();

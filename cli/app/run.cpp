@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "alidade/files/sha256.h"
+#include "alidade/results/file_verdict.h"
 #include "alidade/results/thin_tables.h"
 #include "cli/app/terminal.h"
 
@@ -47,6 +48,10 @@ void Run::add_input(std::string role, const std::filesystem::path& file) {
 }
 
 void Run::add_input(std::string role, std::string name, std::string_view bytes) {
+  constexpr std::size_t longest = std::size_t{1} << 24U;  // films and tables say nothing
+  if (bytes.size() < longest) {
+    if (auto told = file_verdict(bytes)) told_.emplace_back(name, std::move(*told));
+  }
   document.inputs.push_back({std::move(role), std::move(name), bytes.size(), sha256(bytes)});
 }
 
@@ -78,6 +83,7 @@ void Run::say(std::string line) { lines_.push_back(std::move(line)); }
 
 ExitCode Run::finish(Verdict verdict) {
   document.verdict = std::move(verdict);
+  for (const auto& [file, told] : told_) heed_file(file, told, document.command == "project", document.verdict);
   settle(document);
   document.seconds.insert(document.seconds.begin(), {"total", seconds_since(start_)});
   if (options.keeps_outcome) {

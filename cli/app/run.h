@@ -15,6 +15,7 @@
 #include "alidade/estimation/verdict.h"
 #include "alidade/files/files.h"
 #include "alidade/files/spool.h"
+#include "alidade/results/file_verdict.h"
 #include "alidade/results/outcome.h"
 #include "alidade/results/result_document.h"
 #include "alidade/results/result_folder.h"
@@ -113,6 +114,7 @@ class Run {
   std::string result_, printed_file_;
   std::filesystem::path folder_;  ///< Where the results stand: DIR, or DIR/refused.
   bool has_report_ = false;
+  std::vector<std::pair<std::string, FileVerdict>> told_;  ///< Of inputs that come from an answer that is not good.
 };
 
 }  // namespace alidade::cli

@@ -131,7 +131,7 @@ class Lot {
     BatchRow row{.camera = job.camera, .folder = row_folder(i, job.camera)};
     const std::filesystem::path folder = run_.options.out / row.folder;
     const auto begin = std::chrono::steady_clock::now();
-    if (const std::string fault = fault_of(job.words); !fault.empty()) {
+    if (const std::string fault = job.fault.empty() ? fault_of(job.words) : job.fault; !fault.empty()) {
       row.exit_code = static_cast<int>(ExitCode::usage);
       row.state = "failed";
       row.sentence = fault;

@@ -142,6 +142,17 @@ TEST_F(RangefinderCommand, ProjectNamesAnotherCamera) {
       << other;
 }
 
+TEST_F(RangefinderCommand, ProjectIsNoSurerThanTheRunThatMadeTheBeam) {
+  simulate();
+  ASSERT_EQ(calibrate({"--no-report", "--scale"}).code, 0);
+  ASSERT_NE(read_file(path("out/rangefinder.yaml")).find("\nverdict: care\n"), std::string::npos);
+  const Json verdict = Json::parse(alidade({"project", "--beam", path("out/rangefinder.yaml"), "--range", "2", "--json",
+                                            "--no-report", "--out", path("projected")})
+                                       .out)["verdict"];
+  EXPECT_EQ(verdict["state"], "care");
+  EXPECT_THAT(verdict["sentence"].get<std::string>(), ::testing::HasSubstr("rangefinder.yaml says ◆"));
+}
+
 TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {
   simulate();
   const std::vector<std::string> arguments{"rangefinder", path("sim/shots.csv"),

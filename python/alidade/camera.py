@@ -65,10 +65,13 @@ class Camera:
     def from_opencv(cls, K: Any, dist: Any = None, size: tuple[int, int] = (0, 0), covariance: Any = None, *,
                     fisheye: bool = False) -> Camera:
         """From OpenCV's camera matrix (3, 3) and coefficients k1 k2 p1 p2 k3 (0, 4, 5, 8, 12 or 14 of them; those beyond
-        k3 must be 0), or k1…k4 of cv2.fisheye; size (width, height); covariance over `parameter_names`."""
+        k3 must be 0), or k1…k4 of cv2.fisheye; size (width, height); covariance over
+        `parameter_names`, or (9, 9) over fx fy cx cy k1 k2 p1 p2 k3 ((8, 8) of a fisheye: k1…k4), without skew, as OpenCV counts."""
         matrix = numbers(K, "K")
         if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
             raise ValueError(f"K: (3, 3) finite numbers are needed, but the shape is {matrix.shape}")
+        if matrix[1, 0] != 0.0 or matrix[2].tolist() != [0.0, 0.0, 1.0]:
+            raise ValueError("K: [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] is needed")
         width, height = image_size(size)
         coefficients = [] if dist is None else numbers(dist, "dist").ravel().tolist()
         if not all(math.isfinite(each) for each in coefficients):
@@ -79,7 +82,7 @@ class Camera:
         core = _alidade.camera_from_opencv(focal_centre, matrix[0, 1], coefficients, fisheye, width, height)
         if covariance is None:
             return cls._of(core)
-        square = _square(covariance, len(core.names))
+        square = _square(_in_our_order(covariance, core), len(core.names))
         return cls._of(_alidade.Camera(core.model, width, height, core.values, square, 0.0, ""))
 
     def to_opencv(self) -> tuple[Numbers, Numbers]:
@@ -265,6 +268,19 @@ def _refuse_file(model: Any) -> None:
 def _restored(model: str, width: int, height: int, values: list[float], covariance: Numbers, rms_px: float,
               source: str) -> Camera:
     return Camera._of(_alidade.Camera(model, width, height, values, covariance, rms_px, source))
+
+
+def _in_our_order(covariance: Any, core: Any) -> Any:
+    """A covariance without the skew, which OpenCV has not, with it: fixed."""
+    names = [name for name in core.names if name != "skew"]
+    square = numbers(covariance, "covariance")
+    if "skew" not in core.names or square.shape != (len(names), len(names)):
+        return covariance
+    opencv = [name for name in ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4") if name in names]
+    at = [core.names.index(name) for name in opencv]
+    full = np.zeros((len(core.names), len(core.names)))
+    full[np.ix_(at, at)] = square
+    return full
 
 
 def _square(covariance: Any, count: int) -> Numbers:

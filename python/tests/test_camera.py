@@ -157,6 +157,13 @@ class Values(unittest.TestCase):
         self.assertIsNone(CAMERA.covariance)
         self.assertTrue(np.isnan(CAMERA.sigma.fx))
 
+    def test_a_covariance_without_skew_is_opencvs(self):
+        root = np.random.default_rng(2).normal(size=(9, 9))
+        camera = al.Camera.from_opencv(K, DIST, SIZE, covariance=root @ root.T)
+        at = [camera.parameter_names.index(name) for name in ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")]
+        np.testing.assert_array_equal(camera.covariance[np.ix_(at, at)], root @ root.T)
+        self.assertEqual(camera.sigma.skew, 0.0)
+
     def test_files_of_every_format(self):
         with tempfile.TemporaryDirectory() as folder:
             for name in ("alidade", "opencv", "ros", "mrcal"):
@@ -178,6 +185,8 @@ class Values(unittest.TestCase):
                      lambda: al.Camera("brown", SIZE, fx=np.nan), lambda: al.Camera("brown", "640"),
                      lambda: al.Camera.from_opencv(np.eye(4), DIST, SIZE), lambda: al.Camera.from_opencv(-K, DIST, SIZE),
                      lambda: al.Camera.from_opencv(K, DIST[:3], SIZE), lambda: al.Camera.from_opencv(K, DIST, (0, 1)),
+                     lambda: al.Camera.from_opencv(K + [[0, 0, 0], [0, 0, 0], [1, 0, 0]], DIST, SIZE),
+                     lambda: al.Camera.from_opencv(K + [[0, 0, 0], [1, 0, 0], [0, 0, 0]], DIST, SIZE),
                      lambda: al.Camera.from_opencv(K, DIST, SIZE, np.eye(3)), lambda: al.Camera.from_opencv(K, [1.0] * 8, SIZE)):
             with self.assertRaises(ValueError):
                 work()

@@ -40,6 +40,15 @@ std::string number_text(double value) {
   return text;
 }
 
+std::string quoted_text(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + "\"";
+}
+
 std::string number_list(const std::vector<double>& values) {
   std::vector<std::string> texts;
   for (const double value : values) texts.push_back(number_text(value));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +23,11 @@ namespace alidade::detail {
 [[nodiscard]] int checked_size(double value, const std::string& file, const std::string& key);
 /// Shortest text that reads back as the same double, always with a point or an exponent.
 [[nodiscard]] std::string number_text(double value);
+/// Keys of what a run said of the answer that a file holds, beside those of the answer.
+inline constexpr std::array<const char*, 2> verdict_keys{"verdict", "verdict_sentence"};
+
+/// One line of text as a YAML string in double quotes.
+[[nodiscard]] std::string quoted_text(const std::string& text);
 [[nodiscard]] std::string number_list(const std::vector<double>& values);
 
 /// The entries of a YAML map with the file's name in every message.

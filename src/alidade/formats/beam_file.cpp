@@ -68,7 +68,9 @@ const std::vector<std::string> keys{"origin_m",
                                     "sigma_range_incidence_m",
                                     "covariance",
                                     "covariance_with_camera",
-                                    "camera"};
+                                    "camera",
+                                    detail::verdict_keys[0],
+                                    detail::verdict_keys[1]};
 
 double not_negative(const Fields& fields, const std::string& key, double otherwise) {
   if (!fields.has(key)) return otherwise;

@@ -9,16 +9,6 @@
 namespace alidade::detail {
 namespace {
 
-/// One line of text as a YAML string in double quotes.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return out + "\"";
-}
-
 /// How a parameter stands in the file: a port's normal as one vector, everything else under its own name.
 bool is_of_normal(const std::string& name) { return name == "normal_x" || name == "normal_y"; }
 
@@ -63,6 +53,7 @@ Camera read_alidade(const YAML::Node& root, const CameraText& file) {
   const std::vector<std::string> keys = keys_of(names);
   known.insert(known.end(), keys.begin(), keys.end());
   known.insert(known.end(), {"rms_px", "source", "covariance"});
+  known.insert(known.end(), verdict_keys.begin(), verdict_keys.end());
   refuse_unknown_keys(fields, known, "this model");
 
   Camera camera;
@@ -104,7 +95,7 @@ std::string write_alidade(const Camera& camera) {
     text += fmt::format("normal: {}\n", number_list({normal.x(), normal.y(), normal.z()}));
   }
   if (camera.rms_px > 0.0) text += fmt::format("rms_px: {}\n", number_text(camera.rms_px));
-  if (!camera.source.empty()) text += fmt::format("source: {}\n", quoted(camera.source));
+  if (!camera.source.empty()) text += fmt::format("source: {}\n", quoted_text(camera.source));
   if (camera.cov.rows() != values.size() || camera.cov.cols() != values.size()) return text;
   text += fmt::format("covariance:  # upper triangle, row by row\n  names: [{}]\n  upper: [", fmt::join(names, ", "));
   for (Eigen::Index i = 0; i < camera.cov.rows(); ++i) {

@@ -254,7 +254,7 @@ std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) 
 Rig read_rig(const std::filesystem::path& file) {
   const YAML::Node root = detail::load_yaml(read_file(file), file.string());
   const Fields fields(root, file.string());
-  refuse_unknown_keys(fields, {"heads", "covariance"}, "a rig");
+  refuse_unknown_keys(fields, {"heads", "covariance", detail::verdict_keys[0], detail::verdict_keys[1]}, "a rig");
   const YAML::Node heads = root["heads"];
   if (!heads.IsDefined() || !heads.IsSequence() || heads.size() == 0)
     refuse(file.string(), "heads", "must be a list of at least one head");

@@ -116,6 +116,9 @@ struct PathError {
   /// RMS of the positions' stated σ (root of the trace), with the aligned scale: what `ate_m` should not be above, as
   /// an alignment takes errors away and adds none.
   double stated_m = std::numeric_limits<double>::quiet_NaN();
+  /// Mean of dᵀ Σ⁻¹ d of the aligned positions, over their 3 coordinates (Bar-Shalom, eq. 5.4.2-3). Errors of a path
+  /// are alike from frame to frame, and aligned away in part: below 1 is no fault.
+  double nees_per_dof = std::numeric_limits<double>::quiet_NaN();
   std::size_t num_pairs = 0;
 };
 

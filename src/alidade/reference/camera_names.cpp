@@ -160,6 +160,7 @@ diff.
 )"},
                                 {"camera undistort", R"(estimate:
 @lens camera.
+black_share  1  of a straight image's pixels, those that the photo does not show
 photos[].
   file     text  photo
   written  text  its straight image

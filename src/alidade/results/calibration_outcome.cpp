@@ -135,6 +135,7 @@ JobOutcome outcome_of(const Calibration& calibration) {
   outcome.document.verdict = calibration.verdict;
   summarize(calibration, outcome.lines);
   add_result_files(calibration, outcome.files);
+  note_verdict({"camera.yaml"}, outcome);
   return outcome;
 }
 

@@ -31,11 +31,14 @@ NumberColumns path_columns(bool has_truth) {
 
 DataTable path_table(std::span<const PathStep> path, std::span<const TimedPose> truth) {
   std::vector<bool> must_keep;
-  for (const PathStep& step : path)
+  std::vector<double> nis;
+  for (const PathStep& step : path) {
     must_keep.push_back(step.event == FrameEvent::started || step.event == FrameEvent::restarted);
+    nis.push_back(step.nis_per_dof);
+  }
   NumberColumns columns = path_columns(!truth.empty());
   std::vector<std::string> events;
-  for (const std::size_t row : report::thinned_rows(path.size(), {}, must_keep, report::max_step_rows)) {
+  for (const std::size_t row : report::thinned_rows(path.size(), {nis}, must_keep, report::max_step_rows)) {
     const PathStep& step = path[row];
     columns.add({step.t_s});
     columns.add_pose(step.has_pose() ? &step.world_from_cam : nullptr);
@@ -51,7 +54,7 @@ DataTable path_table(std::span<const PathStep> path, std::span<const TimedPose> 
   DataTable table{"path", {}};
   columns.append_to(table);
   table.columns.emplace_back("event", events);
-  record_steps_kept(table, path.size(), "poses.csv");
+  record_steps_kept(table, path.size(), "nis", "poses.csv");
   return table;
 }
 
@@ -83,6 +86,7 @@ void fill_path_estimate(const Localization& result, ResultDocument& document) {
   estimate["rpe_rad"] = result.error.rpe_rad;
   estimate["unaligned_m"] = result.scale_known ? result.error.unaligned_m : missing_value;
   estimate["stated_m"] = result.error.stated_m;
+  estimate["nees_per_dof"] = result.error.nees_per_dof;
   estimate["alignment"] = result.truth.empty() ? JsonValue() : JsonValue(result.scale_known ? "SE(3)" : "Sim(3)");
   estimate["nis_per_dof"] = result.nis_per_dof;
   estimate["sigma_px"] = result.sigma_px;
@@ -210,6 +214,7 @@ JobOutcome outcome_of(const Localization& localization) {
   if (localization.imu) fill_imu(*localization.imu, document);
   path_lines(localization, outcome.lines);
   add_path_files(localization, outcome.files);
+  note_verdict({"camera.yaml"}, outcome);
   return outcome;
 }
 

@@ -17,7 +17,6 @@ namespace alidade {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr std::size_t max_rows = 4000;  // the page holds them; path.csv has all
 
 JsonValue camera_value(const LocatedCamera& camera) {
   JsonValue value;
@@ -65,7 +64,7 @@ DataTable cameras_table(const MovingTargetReport& report) {
 DataTable path_table(const MovingTargetReport& report) {
   std::array<Numbers, 4> columns;
   const std::vector<bool> none(report.path.size(), false);
-  for (const std::size_t row : report::thinned_rows(report.path.size(), {}, none, max_rows)) {
+  for (const std::size_t row : report::thinned_rows(report.path.size(), {}, none, report::max_step_rows)) {
     columns[0].push_back(report.path_t_s[row]);
     for (std::size_t k = 0; k < 3; ++k) columns[k + 1].push_back(report.path[row][static_cast<Eigen::Index>(k)]);
   }
@@ -74,7 +73,7 @@ DataTable path_table(const MovingTargetReport& report) {
                    {"target_in_world_x_m", rounded(columns[1], 6)},
                    {"target_in_world_y_m", rounded(columns[2], 6)},
                    {"target_in_world_z_m", rounded(columns[3], 6)}}};
-  record_steps_kept(table, report.path.size(), "path.csv");
+  record_steps_kept(table, report.path.size(), "", "path.csv");
   return table;
 }
 
@@ -154,6 +153,7 @@ JobOutcome outcome_of(const NetworkCalibration& calibration) {
   outcome.lines = lines_of(calibration);
   if (!is_estimate(static_cast<int>(calibration.verdict.exit_code))) return outcome;
   add_rig_files(located_rig(calibration), outcome.files);
+  note_verdict({"rig.yaml"}, outcome);
   outcome.files.push_back({"events.csv", events_csv(observations_on_one_clock(calibration), calibration.rig.heads)});
   outcome.files.push_back({"path.csv", path_csv(calibration)});
   return outcome;

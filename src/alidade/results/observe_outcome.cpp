@@ -67,10 +67,13 @@ JobOutcome outcome_of(const ObserveReport& report) {
   outcome.document.verdict = report.verdict;
   say_input(report, outcome.lines);
   if (report.found_matches) outcome.files.push_back({"pairs.csv", pairs_csv(*report.found_matches)});
-  if (is_estimate(static_cast<int>(report.verdict.exit_code))) {
+  const bool is_answered = is_estimate(static_cast<int>(report.verdict.exit_code));
+  if (is_answered) {
     report.photos.empty() ? say_log(report, outcome.lines) : say_photos(report, outcome.lines);
     outcome.files.push_back({"camera.yaml", camera_text(report.camera, CameraFormat::alidade)});
+    note_verdict({"camera.yaml"}, outcome);
   }
+  if (!is_answered) return outcome;
   std::vector<double> times;
   for (const RotationRow& row : report.log.rows) times.push_back(row.t_s);
   outcome.files.push_back({"intrinsics.csv", intrinsics_csv(times, report.steps)});

@@ -9,7 +9,7 @@ namespace alidade {
 struct VideoLog;
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of an observation, its printed lines, camera.yaml where there is a camera, intrinsics.csv, and
+/// The document of an observation, its printed lines, camera.yaml where there is a camera, intrinsics.csv with it, and
 /// pairs.csv where photos were matched.
 [[nodiscard]] JobOutcome outcome_of(const ObserveReport& report);
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <initializer_list>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "alidade/public.h"
@@ -22,6 +24,9 @@ struct JobOutcome {
   std::vector<NamedBytes> files;
   std::vector<NamedBytes> images;  ///< The most wanted first.
 };
+
+/// These files of the outcome say, where its verdict is not good, that it is not.
+void note_verdict(std::initializer_list<std::string_view> files, JobOutcome& outcome);
 
 /// Rows of the job's file that were wrong and not read: counted as given, and named.
 inline void add_skipped(const std::vector<SkippedInput>& skipped, JobOutcome& outcome) {

@@ -309,6 +309,7 @@ void add_beam_files(const Beam& beam, const Camera& camera, JobOutcome& outcome)
   if (!is_estimate(static_cast<int>(outcome.document.verdict.exit_code))) return;
   outcome.files.push_back({"rangefinder.yaml", beam_text(beam, camera, "camera.yaml")});
   outcome.files.push_back({"camera.yaml", camera_text(camera, CameraFormat::alidade)});
+  note_verdict({"rangefinder.yaml"}, outcome);
 }
 
 }  // namespace

@@ -263,6 +263,7 @@ JobOutcome outcome_of(const RigCalibration& calibration) {
   fill_document(calibration, outcome.document);
   outcome.lines = lines_of(calibration);
   if (is_estimate(static_cast<int>(calibration.verdict.exit_code))) add_rig_files(calibration.rig, outcome.files);
+  note_verdict({"rig.yaml"}, outcome);
   return outcome;
 }
 

@@ -41,8 +41,12 @@ std::vector<BatchJob> read_jobs(const std::filesystem::path& file) {
     BatchJob job{csv.line(row), std::to_string(row + 1), {}};
     for (const char* const column : {"command", "arguments"}) {
       if (!csv.has(column)) continue;
-      for (std::string& word : words_of_line(csv.text(row, column), csv.where(row, column)))
-        job.words.push_back(std::move(word));
+      try {
+        for (std::string& word : words_of_line(csv.text(row, column), csv.where(row, column)))
+          job.words.push_back(std::move(word));
+      } catch (const InputError& error) {
+        job.fault = error.what();
+      }
     }
     for (const std::string& column : csv.header()) {
       const std::string& cell = csv.text(row, column);
@@ -56,11 +60,12 @@ std::vector<BatchJob> read_jobs(const std::filesystem::path& file) {
       job.words.push_back(std::move(option));
       if (cell != "true") job.words.push_back(cell);
     }
-    if (job.words.empty())
-      throw InputError(csv.where(row, csv.has("arguments") ? "arguments" : "command") + ": is empty");
+    if (job.words.empty() && job.fault.empty())
+      job.fault = csv.where(row, csv.has("arguments") ? "arguments" : "command") + ": is empty";
     jobs.push_back(std::move(job));
   }
   if (jobs.empty()) throw InputError(csv.name() + ": has no rows");
+  if (std::ranges::none_of(jobs, &std::string::empty, &BatchJob::fault)) throw InputError(jobs.front().fault);
   return jobs;
 }
 

@@ -13,6 +13,7 @@ struct BatchJob {
   std::size_t line = 0;  ///< Of the file.
   std::string camera;    ///< As the row says; else its number, from 1.
   std::vector<std::string> words;
+  std::string fault;  ///< Of a row that says no command; it fails, and the others run.
 };
 
 /// A line's words as a shell takes them: spaces part, "…", '…' and \ quote. Throws InputError beginning with `where`

@@ -40,13 +40,14 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
 void add_path_error(Localization& result) {
   if (result.truth.empty()) return;
   std::vector<TimedPose> path;
-  std::vector<double> sigmas_m;
+  std::vector<Eigen::Matrix3d> covs;
   for (const PathStep& step : result.path) {
     if (!step.has_pose()) continue;
     path.push_back({step.t_s, step.world_from_cam});
-    sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
+    const Eigen::Matrix3d R = step.world_from_cam.rotation.toRotationMatrix();
+    covs.push_back(R * step.cov.topLeftCorner<3, 3>() * R.transpose());
   }
-  if (!path.empty()) result.error = path_error(path, result.truth, result.scale_known, sigmas_m);
+  if (!path.empty()) result.error = path_error(path, result.truth, result.scale_known, covs);
 }
 
 /// A flat target whose plane is that of x and y, and most poses on the side where it is not seen.

@@ -8,6 +8,7 @@ namespace {
 
 struct Pair {
   Rigid3 estimated, truth;
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();  ///< Of the estimated position.
 };
 
 /// RPE: between neighbours, with the aligned scale.
@@ -26,6 +27,25 @@ void add_steps(std::span<const Pair> pairs, PathError& error) {
   error.rpe_rad = std::sqrt(turns2 / num);
 }
 
+/// ATE, and what the covariances say of it.
+void add_aligned(std::span<const Pair> pairs, const Similarity& fit, bool has_covs, PathError& error) {
+  double sum2 = 0.0, variance_m2 = 0.0, nees = 0.0;
+  for (const Pair& pair : pairs) {
+    const Eigen::Vector3d moved =
+        fit.b_from_a.rotation * (fit.scale * pair.estimated.translation) + fit.b_from_a.translation;
+    const Eigen::Vector3d d = moved - pair.truth.translation;
+    const Eigen::Matrix3d R = fit.scale * fit.b_from_a.rotation.toRotationMatrix();
+    sum2 += d.squaredNorm();
+    variance_m2 += fit.scale * fit.scale * pair.cov.trace();
+    if (has_covs) nees += d.dot((R * pair.cov * R.transpose()).ldlt().solve(d));
+  }
+  const auto num = static_cast<double>(pairs.size());
+  error.ate_m = std::sqrt(sum2 / num);
+  if (!has_covs) return;
+  error.stated_m = std::sqrt(variance_m2 / num);
+  error.nees_per_dof = nees / (3.0 * num);
+}
+
 }  // namespace
 
 const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s, double tolerance_s) {
@@ -35,14 +55,13 @@ const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s, doub
 }
 
 PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth, bool is_rigid,
-                     std::span<const double> sigmas_m) {
+                     std::span<const Eigen::Matrix3d> covs) {
   std::vector<Pair> pairs;
-  double variance_m2 = 0.0;
   for (std::size_t i = 0; i < estimated.size(); ++i) {
     const TimedPose* const there = nearest_pose(truth, estimated[i].t_s);
     if (there == nullptr) continue;
     pairs.push_back({estimated[i].world_from_cam, there->world_from_cam});
-    if (!sigmas_m.empty()) variance_m2 += sigmas_m[i] * sigmas_m[i];
+    if (!covs.empty()) pairs.back().cov = covs[i];
   }
   PathError error;
   error.num_pairs = pairs.size();
@@ -59,13 +78,7 @@ PathError path_error(std::span<const TimedPose> estimated, std::span<const Timed
   const auto fit = aligned(a, b, is_rigid);
   if (!fit) return error;
   error.scale = fit->scale;
-  if (!sigmas_m.empty()) error.stated_m = fit->scale * std::sqrt(variance_m2 / num);
-  sum2 = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const Eigen::Vector3d moved = fit->b_from_a.rotation * (fit->scale * a[i]) + fit->b_from_a.translation;
-    sum2 += (moved - b[i]).squaredNorm();
-  }
-  error.ate_m = std::sqrt(sum2 / num);
+  add_aligned(pairs, *fit, !covs.empty(), error);
   add_steps(pairs, error);
   return error;
 }

@@ -13,8 +13,9 @@ constexpr double same_time_s = 0.01;
 [[nodiscard]] const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s,
                                             double tolerance_s = same_time_s);
 
-/// Each estimated pose is compared with the true one of its time. `sigmas_m`: σ of each estimated position, or empty.
+/// Each estimated pose is compared with the true one of its time. `covs`: of each estimated position, in its
+/// world [m²], or empty.
 [[nodiscard]] PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth,
-                                   bool is_rigid, std::span<const double> sigmas_m = {});
+                                   bool is_rigid, std::span<const Eigen::Matrix3d> covs = {});
 
 }  // namespace alidade

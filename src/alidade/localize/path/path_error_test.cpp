@@ -111,10 +111,11 @@ TEST(PathError, StatesWhatSigmaSays) {
   auto rng = testing::make_rng();
   for (const double scale : {1.0, 2.7}) {
     const Paths paths = noisy_paths(rng, scale, 0.02);
-    const std::vector<double> sigmas_m(paths.estimated.size(), std::sqrt(3.0) * 0.02);
-    const PathError error = path_error(paths.estimated, paths.truth, scale == 1.0, sigmas_m);
+    const std::vector<Eigen::Matrix3d> covs(paths.estimated.size(), 0.02 * 0.02 * Eigen::Matrix3d::Identity());
+    const PathError error = path_error(paths.estimated, paths.truth, scale == 1.0, covs);
     EXPECT_NEAR(error.stated_m, scale * std::sqrt(3.0) * 0.02, 0.1 * error.stated_m);
     EXPECT_NEAR(error.ate_m / error.stated_m, 1.0, 0.1);
+    EXPECT_NEAR(error.nees_per_dof, 1.0, 0.2) << "independent errors of a σ that is right, 600 of them less 7";
   }
   EXPECT_TRUE(std::isnan(path_error({}, {}, true).stated_m));
 }

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "alidade/rangefinder/rangefinder.h"
 #include "alidade/rangefinder/solve/beam_solve.h"
@@ -86,6 +87,30 @@ TEST(ReferenceCases, ExactMeasurementsGiveTheExactBeam) {
     expect_beam(report.beam, reference["A"], reference["B"], 1e-8, 1e-8);
     EXPECT_NEAR(direction_angles_rad(report.beam).x(), reference["theta"][0].get<double>(), 1e-8);
     EXPECT_NEAR(direction_angles_rad(report.beam).y(), reference["theta"][1].get<double>(), 1e-8);
+  }
+}
+
+/// Spots alone are judged alike, whichever method was asked for; and exact ones are not too little.
+TEST(ReferenceCases, ExactSpotsAreJudgedByWhatTheyHave) {
+  const Json reference = read_case("b_exact");
+  const Camera camera = camera_of(reference["K"]);
+  const std::vector<Shot> shots = shots_of(reference, true, false);
+  for (const std::optional<double> sigma_px : {std::optional<double>{}, std::optional(0.01), std::optional(1e-4)}) {
+    std::vector<std::string> judged;
+    for (const RangefinderMethod method : {RangefinderMethod::spot, RangefinderMethod::joint}) {
+      RangefinderConfig config;
+      config.method = method;
+      config.sigma_spot_px = sigma_px;
+      if (sigma_px == 1e-4) config.sigma_range_m = 1e-6;
+      const RangefinderReport report = calibrate_rangefinder(shots, {}, camera, config);
+      const Verdict verdict = rangefinder_verdict(report, shots, config);
+      EXPECT_TRUE(verdict.exit_code == ExitCode::ok) << verdict.sentence;
+      expect_beam(report.beam, reference["A"], reference["B"], 1e-8, 1e-8);
+      std::string all = verdict.sentence + verdict.to_add;
+      for (const Check& check : verdict.checks) all += check.name + ": " + check.text + '\n';
+      judged.push_back(all);
+    }
+    EXPECT_EQ(judged[0], judged[1]);
   }
 }
 

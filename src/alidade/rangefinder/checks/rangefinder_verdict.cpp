@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "alidade/rangefinder/checks/cause_checks.h"
+#include "alidade/rangefinder/checks/line_offset.h"
 
 namespace alidade {
 namespace {
@@ -16,9 +17,21 @@ constexpr double min_range_ratio = 2.0, min_normal_spread = 0.1;
 constexpr double degenerate_range_ratio = 1.3;      // 2.0 to 2.4 m: two methods of three are degenerate
 constexpr double degenerate_normal_spread = 0.035;  // tilts of 5°: half of a board's turn is its noise
 
-/// Origin and direction are tied by where the beam hits, so that joint's information is never round: one reading of
-/// 2 m known to 0.1 mm makes 10⁵ of an origin known to 30 mm, which is not degenerate.
-double condition_limit(Method method) { return method == Method::joint ? 1e8 : 1e4; }
+/// By which method the answer is judged: what the shots used have, whatever was allowed to be used.
+Method method_by_shots(const RangefinderReport& report, Method given) {
+  bool has_spots = false, has_planes = false;
+  for (const ShotFit& fit : report.shots) {
+    has_spots = has_spots || (fit.used && fit.residual_px.allFinite());
+    has_planes = has_planes || (fit.used && std::isfinite(fit.residual_range_m));
+  }
+  if (has_spots == has_planes) return has_spots ? Method::joint : given;
+  return has_spots ? Method::spot : Method::plane;
+}
+
+/// Spots tie origin and direction by where the beam hits, so that their information is never round: one reading of 2 m
+/// known to 0.1 mm makes 10⁵ of an origin known to 30 mm, spots from 1.7 to 3.8 m make 10⁴ of one known to 0.04 mm.
+/// Neither is degenerate: how well the origin is known, its σ says.
+double condition_limit(Method method) { return method == Method::plane ? 1e4 : 1e8; }
 /// A spot that is not seen is known by how boards are tilted, to some mrad, which is what its beam illuminates: a
 /// hundredth of the image.
 double good_spot_px(Method method, const Camera& camera) {
@@ -54,61 +67,6 @@ std::string other_method(Method method, const Supply& supply) {
 struct Weakness {
   std::string name, what, add;
 };
-
-/// σ of the beam's distance from the camera's centre: along u, the way to the line, the origin moves it by itself, the
-/// direction by how far away it passes.
-double sigma_of_offset_m(const Beam& beam) {
-  const double along_m = beam.origin_in_cam.dot(beam.direction_in_cam);
-  const Eigen::Vector3d to_line = beam.origin_in_cam - along_m * beam.direction_in_cam;
-  if (!(to_line.norm() > 0.0)) return 0.0;
-  const Eigen::Vector3d u = to_line.normalized();
-  Eigen::Matrix<double, 1, 7> J;
-  J << u.transpose(), -along_m * u.transpose(), 0.0;
-  return std::sqrt((J * embedded_covariance(beam) * J.transpose())[0]);
-}
-
-constexpr double near_centre_m = 0.015;
-
-/// How far the beam's line passes from the camera's centre.
-struct LineOffset {
-  double value_m = 0.0, sigma_m = 0.0;
-};
-
-/// By the spots alone: a ray's x/z and y/z move with 1/range by how far the line passes. Stated where no beam is: with
-/// all spots at one position any origin along their ray will do. None where they do not determine it, either.
-std::optional<LineOffset> offset_by_spots(const RangefinderReport& report, std::span<const Shot> shots) {
-  std::vector<Eigen::Vector3d> seen;  // x/z, y/z, 1/range
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < shots.size() && i < report.shots.size(); ++i) {
-    const auto ray = report.shots[i].used && shots[i].spot ? unproject(report.camera, shots[i].spot->px) : std::nullopt;
-    if (!ray || !(ray->z() > 0.0)) continue;
-    seen.emplace_back(ray->x() / ray->z(), ray->y() / ray->z(), 1.0 / shots[i].range_m);
-    mean += seen.back();
-  }
-  if (seen.size() < 4) return std::nullopt;
-  mean /= static_cast<double>(seen.size());
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& s : seen) scatter += (s - mean) * (s - mean).transpose();
-  if (!(scatter(2, 2) > 0.0)) return std::nullopt;
-  const Eigen::Vector2d slope = scatter.block<2, 1>(0, 2) / scatter(2, 2);
-  const double left = scatter.topLeftCorner<2, 2>().trace() - slope.squaredNorm() * scatter(2, 2);
-  const double variance = std::max(0.0, left) / (2.0 * static_cast<double>(seen.size()) - 4.0);
-  const LineOffset offset{slope.norm(), std::sqrt(variance / scatter(2, 2))};
-  return 3.0 * offset.sigma_m < near_centre_m ? std::optional(offset) : std::nullopt;
-}
-
-/// Of the solved beam; where that does not know it, of the spots.
-LineOffset line_offset(const RangefinderReport& report, std::span<const Shot> shots) {
-  const LineOffset solved{report.bound.offset_m, sigma_of_offset_m(report.beam)};
-  if (3.0 * solved.sigma_m < near_centre_m) return solved;
-  return offset_by_spots(report, shots).value_or(solved);
-}
-
-/// Only where the shots do say so: a line that passes far off, however badly known, is another matter.
-bool passes_the_centre(const LineOffset& offset) {
-  constexpr double min_m = 0.002;  // nearer, no spot moves by what it could be measured with
-  return offset.value_m < near_centre_m && offset.value_m < std::max(min_m, 3.0 * offset.sigma_m);
-}
 
 /// Mean angle of the boards' normals to the camera's view, from the cosines.
 double mean_tilt_rad(const RangefinderReport& report) {
@@ -330,7 +288,7 @@ std::optional<Verdict> refusal_by_check(const RangefinderReport& report, std::sp
 
 Verdict refusal_by_geometry(const RangefinderReport& report, std::span<const Shot> shots, Method method,
                             std::vector<Check>& checks) {
-  const Weakness reason = reason_of(report, shots, method);
+  const Weakness reason = reason_of(report, shots, method_by_shots(report, method));
   Verdict verdict =
       refusal(State::refused, ExitCode::undetermined, reason.what, reason.add + other_method(method, supply_of(shots)));
   for (const Check& check : checks)
@@ -364,13 +322,16 @@ Verdict verdict_of_beam(const RangefinderReport& report, std::span<const Check> 
 std::vector<Check> checks_of(const RangefinderReport& report, std::span<const Shot> shots,
                              const RangefinderConfig& config) {
   Verdict verdict;
-  add_precision(report, config.method, verdict);
-  add_geometry(report, shots, config.method, verdict);
+  const Method method = method_by_shots(report, config.method);
+  add_precision(report, method, verdict);
+  add_geometry(report, shots, method, verdict);
   add_fit(report, verdict);
   add_clusters(report, verdict);
   if (config.method != Method::spot) add_boards(report, shots, verdict);
   add_spare(report, verdict);
-  add_cause_checks(report, shots, config, verdict);
+  RangefinderConfig judged = config;
+  judged.method = method;
+  add_cause_checks(report, shots, judged, verdict);
   add_handedness(report, verdict);
   return std::move(verdict.checks);
 }

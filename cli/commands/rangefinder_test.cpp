@@ -166,6 +166,16 @@ TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {
   EXPECT_THAT(outcome.err, ::testing::HasSubstr("--corners " + path("sim/corners.csv")));
 }
 
+/// Photos in which nothing is to be found are not needed.
+TEST_F(RangefinderCommand, SpotsThatAreGivenNeedNoPhotos) {
+  simulate();
+  for (const char* method : {"spot", "joint"}) {
+    const Outcome outcome = calibrate_table(read_file(path("sim/shots.csv")), {"--method", method, "--json"});
+    ASSERT_EQ(outcome.code, 0) << method << outcome.err;
+    expect_near_truth(Json::parse(outcome.out));
+  }
+}
+
 TEST_F(RangefinderCommand, ProjectSaysWhereTheSpotIsAndHowSure) {
   simulate();
   ASSERT_EQ(calibrate({"--no-report"}).code, 0);

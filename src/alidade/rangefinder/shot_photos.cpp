@@ -71,6 +71,7 @@ cv::Mat loaded(const PhotoByName& load_photo, const std::string& name) {
 
 ShotPhoto look_at(Shot& shot, const PhotoByName& load_photo, const Camera& camera, const ShotPhotosConfig& config) {
   ShotPhoto seen;
+  if (shot.spot && !config.board) return seen;  // nothing to look for
   const cv::Mat photo = loaded(load_photo, shot.photo);
   if (photo.empty()) return seen;
   seen.has_photo = true;

@@ -95,11 +95,28 @@ ExitCode by_edges(const RangefinderArgs& args, Run& run) {
   return run.finish(outcome_of(result));
 }
 
-/// Corners of a table replace those in the photos.
-void take_corners(const RangefinderArgs& args, std::vector<Shot>& shots, Run& run) {
+/// Corners of a table replace those in the photos. What of the table is not used is rejected by name.
+std::vector<SkippedInput> take_corners(const RangefinderArgs& args, std::vector<Shot>& shots, Run& run) {
   if (!args.config.board) throw UsageError("--corners needs --board and --square");
   run.add_input("corners", args.corners);
-  add_corners(args.corners, read_corners(args.corners, num_points(*args.config.board)), shots);
+  std::vector<SkippedInput> rows;
+  const std::vector<BoardView> views =
+      read_corners(args.corners, num_points(*args.config.board), args.skip_bad ? &rows : nullptr);
+  for (SkippedInput& view : add_corners(args.corners, views, shots)) rows.push_back(std::move(view));
+  return rows;
+}
+
+/// Corners that were not used are no shots: they are named, and do not count among those given.
+void add_not_used(std::span<const SkippedInput> corners, JobOutcome& outcome) {
+  constexpr std::size_t most_lines = 5;
+  std::vector<SkippedInput>& skipped = outcome.document.counts.skipped;
+  skipped.insert(skipped.end(), corners.begin(), corners.end());
+  std::vector<std::string> lines;
+  for (const SkippedInput& one : corners.first(std::min(most_lines, corners.size())))
+    lines.push_back("not used: " + one.file + (one.line > 0 ? ":" + std::to_string(one.line) : "") + ": " + one.reason);
+  if (corners.size() > most_lines)
+    lines.push_back("not used: " + std::to_string(corners.size() - most_lines) + " more: see result.json");
+  outcome.lines.insert(outcome.lines.begin(), lines.begin(), lines.end());
 }
 
 ExitCode by_shots(const RangefinderArgs& args, Run& run) {
@@ -111,8 +128,9 @@ ExitCode by_shots(const RangefinderArgs& args, Run& run) {
   const Camera camera = read_central_camera(args.camera);
   const TablePhotos photos(args.shots, photo_roles(table.shots));
   PhotoByName load_photo = photos.loader();
+  std::vector<SkippedInput> not_used;  // of the corners
   if (!args.corners.empty()) {
-    take_corners(args, table.shots, run);
+    not_used = take_corners(args, table.shots, run);
     load_photo = nullptr;
   }
   run.lap("read");
@@ -122,6 +140,7 @@ ExitCode by_shots(const RangefinderArgs& args, Run& run) {
     refuse_photo_of(result.unreadable.front(), result.counts.skipped.front().reason);
   add_skipped(table.skipped, result.counts);
   JobOutcome outcome = outcome_of(result, std::filesystem::path(args.camera).filename().string());
+  add_not_used(not_used, outcome);
   if (!run.options.no_report) add_images(result, load_photo, outcome);
   for (InputFile& input : photos.inputs()) run.document.inputs.push_back(std::move(input));
   return run.finish(std::move(outcome));

@@ -176,6 +176,39 @@ TEST_F(RangefinderCommand, SpotsThatAreGivenNeedNoPhotos) {
   }
 }
 
+TEST_F(RangefinderCommand, CornersOfNoShotAreNamed) {
+  simulate();
+  const std::string corners = read_file(path("sim/corners.csv")), header = corners.substr(0, corners.find('\n') + 1);
+  const auto renamed = [&](const std::string& from, const std::string& to) {
+    std::string text = corners;
+    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+      text.replace(at, from.size(), to);
+    write_file(path("sim/corners.csv"), text);
+    return calibrate({"--json", "--no-report"});
+  };
+  const Outcome none = renamed("shot_", "img_");
+  EXPECT_EQ(none.code, 3) << none.out;
+  EXPECT_THAT(none.err, ::testing::HasSubstr("has corners of no shot's photo: 'img_001.png' is none of them"));
+  EXPECT_EQ(std::ranges::count(none.err, '\n'), 1) << none.err;
+  const Outcome one = renamed("shot_001.png", "img_001.png");
+  ASSERT_EQ(one.code, 0) << one.err;
+  const Json counts = Json::parse(one.out)["counts"];
+  EXPECT_EQ(counts["given"], 18);
+  ASSERT_EQ(counts["skipped"].size(), 1u);
+  EXPECT_EQ(counts["skipped"][0]["reason"], "no shot has the photo 'img_001.png': its 54 corners are not used");
+  write_file(path("sim/corners.csv"), header);
+  const Outcome empty = calibrate({"--no-report"});
+  EXPECT_EQ(empty.code, 3) << empty.out;
+  EXPECT_THAT(empty.err, ::testing::HasSubstr("corners.csv: has no corners"));
+  // A wrong row of the corners is rejected by name, as one of the shots is.
+  write_file(path("sim/corners.csv"),
+             corners + corners.substr(header.size(), corners.find('\n', header.size()) + 1 - header.size()));
+  EXPECT_EQ(calibrate({"--no-report"}).code, 3);
+  const Outcome skipped = calibrate({"--skip-bad", "--json", "--no-report"});
+  ASSERT_EQ(skipped.code, 0) << skipped.err;
+  EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 1u);
+}
+
 TEST_F(RangefinderCommand, ProjectSaysWhereTheSpotIsAndHowSure) {
   simulate();
   ASSERT_EQ(calibrate({"--no-report"}).code, 0);

@@ -122,6 +122,15 @@ void refuse_planes_behind(const Csv& csv, std::span<const Shot> shots) {
         ": all planes are behind the camera: a board's points x have n·x + d = 0, is 'd' of the other sign?");
 }
 
+/// Corners of other photos than the shots': of another folder, or named otherwise.
+[[noreturn]] void refuse_foreign_corners(const std::filesystem::path& corners, const std::string& photo,
+                                         std::span<const Shot> shots) {
+  const auto named = std::ranges::find_if(shots, [](const Shot& shot) { return !shot.photo.empty(); });
+  throw InputError(
+      corners.string() + ": has corners of no shot's photo: '" + photo + "' is none of them" +
+      (named != shots.end() ? ", they are named as '" + named->photo + "'" : "; the shots need a column 'photo'"));
+}
+
 std::string number(double value) { return fmt::format("{:.9g}", value); }
 
 }  // namespace
@@ -154,13 +163,26 @@ std::map<std::string, std::string> photo_roles(std::span<const Shot> shots) {
   return roles;
 }
 
-void add_corners(const std::filesystem::path& corners, std::span<const BoardView> views, std::vector<Shot>& shots) {
-  for (Shot& shot : shots) {
-    if (shot.photo.empty()) continue;
-    for (const BoardView& view : views)
-      if (view.photo == shot.photo) shot.board = view;
-    if (!shot.board) shot.no_board = "has no corners in " + corners.string();
+std::vector<SkippedInput> add_corners(const std::filesystem::path& corners, std::span<const BoardView> views,
+                                      std::vector<Shot>& shots) {
+  if (views.empty()) throw InputError(corners.string() + ": has no corners");
+  std::vector<SkippedInput> foreign;
+  for (const BoardView& view : views) {
+    bool is_of_a_shot = false;
+    for (Shot& shot : shots) {
+      if (shot.photo != view.photo) continue;
+      shot.board = view;
+      is_of_a_shot = true;
+    }
+    if (!is_of_a_shot)
+      foreign.push_back(
+          {corners.string(), 0,
+           fmt::format("no shot has the photo '{}': its {} corners are not used", view.photo, view.corners.size())});
   }
+  if (foreign.size() == views.size()) refuse_foreign_corners(corners, views.front().photo, shots);
+  for (Shot& shot : shots)
+    if (!shot.photo.empty() && !shot.board) shot.no_board = "has no corners in " + corners.string();
+  return foreign;
 }
 
 void refuse_photo_of(const Shot& shot, const std::string& reason) {

@@ -37,8 +37,10 @@ struct ShotsOptions {
 [[nodiscard]] std::map<std::string, std::string> photo_roles(std::span<const Shot> shots);
 
 /// Gives each view of a table of corners, `corners` by name, to the shots whose photo it names. A shot whose photo has
-/// none says so.
-void add_corners(const std::filesystem::path& corners, std::span<const BoardView> views, std::vector<Shot>& shots);
+/// none says so. Views of photos that no shot names are returned as rejected; throws InputError where that is so of
+/// all, or where there are none.
+[[nodiscard]] std::vector<SkippedInput> add_corners(const std::filesystem::path& corners,
+                                                    std::span<const BoardView> views, std::vector<Shot>& shots);
 
 /// Throws InputError about the first of these shots, whose photo could not be used; `reason`: why. Points to a table of
 /// corners beside the shots, where there is one.

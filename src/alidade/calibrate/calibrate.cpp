@@ -1,8 +1,11 @@
 #include "alidade/calibrate/calibrate.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/calibrate/checks/corner_numbering.h"
 #include "alidade/calibrate/checks/lens_covariance.h"
 #include "alidade/calibrate/checks/repeated_views.h"
 #include "alidade/calibrate/far_corners.h"
@@ -28,9 +31,11 @@ void refuse(CalibrateReport& report, std::string reason, std::string to_add) {
 }
 
 /// Takes in every view with enough corners, once; the others are named.
-void take_usable_views(std::span<const BoardView> views, CalibrateReport& report, CalibrationWork& work) {
+void take_usable_views(const Board& board, std::span<const BoardView> views, CalibrateReport& report,
+                       CalibrationWork& work) {
   constexpr std::size_t min_corners = 6;  // a pose takes 3; the rest must say something of the lens
   const auto repeats = repeated_views(views);
+  const std::vector<std::string> misnumbered = numbering_faults(board, views, report.board_points);
   for (std::size_t k = 0; k < views.size(); ++k) {
     report.views[k].corners.resize(views[k].corners.size());
     if (repeats[k]) {
@@ -39,6 +44,8 @@ void take_usable_views(std::span<const BoardView> views, CalibrateReport& report
       report.views[k].reason = "no corners";
     } else if (views[k].corners.size() < min_corners) {
       report.views[k].reason = "only " + std::to_string(views[k].corners.size()) + " corners";
+    } else if (!misnumbered[k].empty()) {
+      report.views[k].reason = misnumbered[k];
     } else {
       work.number.push_back(k);
       work.views.push_back(views[k]);
@@ -205,6 +212,15 @@ void judge(const CalibrationWork& work, const BundleResult& result, bool settled
 }
 
 void refuse_few(const CalibrationWork& work, std::size_t least, CalibrateReport& report) {
+  const auto numbered = std::find_if(report.views.begin(), report.views.end(),
+                                     [](const ViewFit& view) { return view.reason.starts_with("its corners are"); });
+  if (numbered != report.views.end()) {
+    const auto count = std::count_if(report.views.begin(), report.views.end(),
+                                     [&](const ViewFit& view) { return view.reason == numbered->reason; });
+    refuse(report, fmt::format("of {} of {} photos: {}", count, report.views.size(), numbered->reason),
+           "number the corners row by row, from the left, as --board counts them");
+    return;
+  }
   const bool repeated = std::any_of(report.views.begin(), report.views.end(),
                                     [](const ViewFit& view) { return view.reason.starts_with("is the same image"); });
   refuse(report,
@@ -257,7 +273,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   report.camera.width_px = size.width_px;
   report.camera.height_px = size.height_px;
   CalibrationWork work;
-  take_usable_views(views, report, work);
+  take_usable_views(board, views, report, work);
   const std::size_t least = min_views(config);
   if (work.views.size() < least) {
     refuse_few(work, least, report);

@@ -38,7 +38,7 @@ std::vector<BatchJob> read_jobs(const std::filesystem::path& file) {
   if (!csv.has("arguments") && !csv.has("command")) csv.refuse_missing("arguments");
   std::vector<BatchJob> jobs;
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    BatchJob job{csv.line(row), std::to_string(row + 1), {}};
+    BatchJob job{csv.line(row), std::to_string(row + 1), {}, ""};
     for (const char* const column : {"command", "arguments"}) {
       if (!csv.has(column)) continue;
       try {

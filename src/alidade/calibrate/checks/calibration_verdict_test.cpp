@@ -137,10 +137,15 @@ TEST(CalibrationVerdict, MirroredImagesAreNamed) {
   };
   mirror(views[4]);
   const Calibration one = sample_calibration(views);
-  EXPECT_EQ(check_named(one.verdict, "mirrored").state, State::care);
-  EXPECT_THAT(check_named(one.verdict, "mirrored").text, HasSubstr("1 of 20 boards, the first in " + views[4].photo));
-  EXPECT_THAT(one.verdict.to_add, HasSubstr("from left to right"));
-  mirror(views[4]);
+  EXPECT_FALSE(one.views[4].used) << "alone it would draw cx to the other side";
+  EXPECT_THAT(one.views[4].reason, HasSubstr("seen from behind, unlike the others'"));
+  for (std::size_t k = 0; k < views.size(); k += 2)
+    if (k != 4) mirror(views[k]);
+  const Calibration half = sample_calibration(views);
+  EXPECT_EQ(check_named(half.verdict, "mirrored").state, State::care);
+  EXPECT_THAT(check_named(half.verdict, "mirrored").text, HasSubstr("10 of 20 boards, the first in " + views[0].photo));
+  EXPECT_THAT(half.verdict.to_add, HasSubstr("from left to right"));
+  for (std::size_t k = 0; k < views.size(); k += 2) mirror(views[k]);
   EXPECT_EQ(check_named(sample_calibration(views).verdict, "mirrored").state, State::good);
   std::ranges::for_each(views, mirror);
   const Calibration all = sample_calibration(views);

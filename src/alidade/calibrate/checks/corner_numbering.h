@@ -1,0 +1,19 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/board/board.h"
+#include "alidade/board/board_view.h"
+
+namespace alidade {
+
+/// For each view what is wrong with how its corners are numbered, or with its image; empty where nothing is. A
+/// perspective of the plane of the board takes the points to the corners but for distortion (Hartley & Zisserman,
+/// §2.3): far from one is a view that another numbering brings to one, or that alone of all is in none. The view of a
+/// board from behind is a fault where most views are from the front, of a board that is flat.
+[[nodiscard]] std::vector<std::string> numbering_faults(const Board& board, std::span<const BoardView> views,
+                                                        std::span<const Eigen::Vector3d> board_points);
+
+}  // namespace alidade

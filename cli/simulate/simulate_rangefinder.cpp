@@ -135,6 +135,10 @@ void add_mistakes(CLI::App& command, SimulateRangefinderArgs& args) {
              -1.0, 1.0);
   add_number(command, "--wander-px", args.mistake.wander_px, "What the spots move by from the first shot to the last",
              -1e3, 1e3);
+  add_number(command, "--bow-m", args.noise.bow_m,
+             "Bow of the board along its rows: of its centre over its left and right border [m]", -0.1, 0.1);
+  add_number(command, "--twist-m", args.noise.twist_m, "Twist of the board: of its corners out of its plane [m]", -0.1,
+             0.1);
   command.add_flag("--exchange-uv", args.mistake.exchange_uv, "u and v of the spots are exchanged");
   command.add_option("--unit", args.unit, "Of the readings in the table")
       ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))

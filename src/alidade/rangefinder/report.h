@@ -41,8 +41,8 @@ struct FixedQuantity {
 
 /// An error that the measurements of all shots may share, tested by itself (score test).
 struct ShotCause {
-  std::string
-      name;  ///< drift: of the readings over the rows; bend: over their range; wander: of the spots over the rows
+  std::string name;   ///< drift: of the readings over the rows; bend: over their range; wander: of the spots over the
+                      ///< rows; bent: of the board out of its plane
   double size = 0.0;  ///< From the first row to the last; of bend, at the ends of the span.
   std::string unit;
   double sigmas = 0.0;                    ///< By how many σ the residuals indicate it.

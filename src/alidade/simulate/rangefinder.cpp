@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "alidade/board/board_bend.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/simulate/draws.h"
@@ -169,9 +170,30 @@ RangefinderScene draw_rangefinder_scene(const RangefinderSceneConfig& config, st
   return scene;
 }
 
+namespace {
+
+/// The board as it is, not as it was printed.
+struct BentBoard {
+  BoardBend bend;
+  Eigen::Vector3d size_m;
+
+  [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector3d& point_in_board) const {
+    return point_in_board + bend.heights_at(point_in_board).dot(size_m) * Eigen::Vector3d::UnitZ();
+  }
+  /// The reading where the beam, which meets the plane at `range_m`, meets the board.
+  [[nodiscard]] double range_m(const Rigid3& cam_from_board, const Beam& beam, double range_m) const {
+    const Eigen::Vector3d hit = cam_from_board.inverse() * point_at(beam, range_m);
+    const double cosine = (cam_from_board.rotation * Eigen::Vector3d::UnitZ()).dot(beam.direction_in_cam);
+    return range_m + (at(hit) - hit).z() / (cosine * beam.scale);
+  }
+};
+
+}  // namespace
+
 SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& noise, std::uint64_t seed) {
   Draws draws(seed);
   const std::vector<Eigen::Vector3d> points = points_in_board(scene.board);
+  const BentBoard board{BoardBend(points), {noise.bow_m, 0.0, noise.twist_m}};
   SimulatedShots simulated{{}, draw_outliers(scene.range_m.size(), noise.outlier_share, draws)};
   const Eigen::Matrix2d cov =
       std::max(1e-12, noise.sigma_corner_px * noise.sigma_corner_px) * Eigen::Matrix2d::Identity();
@@ -179,7 +201,7 @@ SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& no
     const Plane plane = plane_of(scene.cam_from_board[i]);
     const double cosine = std::abs(plane.normal_in_cam.dot(scene.beam.direction_in_cam));
     const double tangent = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
-    const double true_range_m = scene.range_m[i];
+    const double true_range_m = board.range_m(scene.cam_from_board[i], scene.beam, scene.range_m[i]);
     Shot shot;
     shot.name = "shot " + std::to_string(i + 1);
     shot.range_m = true_range_m + scene.beam.noise.sigma_at(true_range_m, tangent) * draws.normal();
@@ -193,7 +215,7 @@ SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& no
       shot.board.emplace();
       shot.board->photo = shot.name;
       for (std::size_t k = 0; k < points.size(); ++k) {
-        const auto px = project(scene.camera, scene.cam_from_board[i] * points[k]);
+        const auto px = project(scene.camera, scene.cam_from_board[i] * board.at(points[k]));
         const Eigen::Vector2d error_px = noise.sigma_corner_px * draws.normal2();
         if (px) shot.board->corners.push_back({static_cast<int>(k), *px + error_px, cov});
       }

@@ -38,6 +38,8 @@ struct ShotNoise {
   double sigma_spot_px = 0.3;
   double sigma_spot_near_px = 0.0;  ///< Of a spot at 1 m beyond that; it falls with the range: a wide spot, speckle.
   double outlier_share = 0.0;       ///< Of the shots, rounded: their readings are 0.3 to 1 m too long.
+  double bow_m = 0.0;               ///< Of the board along its rows: of its centre over its left and right border.
+  double twist_m = 0.0;             ///< Of its corners out of its plane.
   bool with_spot = true, with_board = true;
 };
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 
+#include "alidade/board/board_bend.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -98,14 +99,12 @@ void add_shape_prior(const BundleProblem& problem, const BundleState& state, Nor
 }  // namespace
 
 BowBasis bow_basis(const std::vector<Eigen::Vector3d>& printed_points) {
-  Eigen::AlignedBox3d box;
-  for (const auto& point : printed_points) box.extend(point);
-  const Eigen::Vector3d centre = box.center(), half = 0.5 * box.sizes().cwiseMax(1e-12);
+  const BoardBend bend(printed_points);
   BowBasis basis;
   for (const auto& point : printed_points) {
-    const Eigen::Vector3d q = (point - centre).cwiseQuotient(half);
-    basis.along_x.push_back(1.0 - q.x() * q.x());
-    basis.along_y.push_back(1.0 - q.y() * q.y());
+    const Eigen::Vector3d heights = bend.heights_at(point);
+    basis.along_x.push_back(heights.x());
+    basis.along_y.push_back(heights.y());
   }
   return basis;
 }

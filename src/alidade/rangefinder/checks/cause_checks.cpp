@@ -72,11 +72,37 @@ std::string asked_of_lens(const FixedQuantity& thing) {
          text_of(thing.value, is_pixels ? 5 : 3);
 }
 
+/// A board that is bent so much that it is no flat board, by more than another lens would explain of the same.
+const ShotCause* bent_board(const RangefinderReport& report) {
+  constexpr double ask_beyond = 3.5, flat_m = 0.0003;
+  const auto bent = std::ranges::find(report.causes, "bent", &ShotCause::name);
+  if (bent == report.causes.end() || !(bent->sigmas > ask_beyond) || !(bent->size > flat_m)) return nullptr;
+  double lens = 0.0;
+  for (const FixedQuantity& thing : report.fixed)
+    if (thing.name.starts_with("camera")) lens = std::max(lens, std::abs(thing.asked) / thing.asked_sigma);
+  for (const FreedDistortion& one : report.freed_distortion)
+    lens = std::max(lens, std::abs(one.value - one.was) / one.sigma);
+  return bent->sigmas > lens ? &*bent : nullptr;
+}
+
+void add_bent_board(const RangefinderReport& report, Verdict& verdict) {
+  const auto found = std::ranges::find(report.causes, "bent", &ShotCause::name);
+  if (found == report.causes.end()) return;
+  const bool is_bent = bent_board(report) != nullptr;
+  verdict.checks.push_back(check_of("bent", is_bent ? State::care : State::good,
+                                    is_bent ? "the board is not flat: it bends by " + text_of(1e3 * found->size, 2) +
+                                                  " mm (" + text_of(found->sigmas, 2) +
+                                                  "σ), counted in σ: glue it to something flat"
+                                            : "no bend of the board is indicated that matters",
+                                    found->sigmas, 3.5, "σ", "residuals"));
+}
+
 /// Do boards and spots ask for another lens than the file's?
 void add_camera(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.5, foreign = 0.02;
   Check check =
       check_of("camera", State::good, "boards and spots agree with the camera file", 0.0, ask_beyond, "σ", "residuals");
+  const bool is_bent = bent_board(report) != nullptr;
   const bool may_bend = std::ranges::count(report.fixed, "board.flat_m", &FixedQuantity::name) > 0;
   for (const FixedQuantity& thing : report.fixed) {
     if (!thing.name.starts_with("camera")) continue;
@@ -86,10 +112,14 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
     if (z < ask_beyond) continue;
     check.state = State::care;
     const bool is_focal = thing.name == "camera.f";
-    check.text = "the shots indicate " + asked_of_lens(thing) + " (" + text_of(z, 2) + "σ): " +
-                 (is_focal && std::abs(thing.asked) > foreign * thing.value ? "the file of another camera, or zoomed"
-                                                                            : "calibrate the camera again") +
-                 (may_bend ? "; a board that is not flat looks alike" : "");
+    check.text = "the shots indicate " + asked_of_lens(thing) + " (" + text_of(z, 2) + "σ)";
+    if (is_bent)
+      check.text += ", which the bend of the board explains";
+    else if (is_focal && std::abs(thing.asked) > foreign * thing.value)
+      check.text += ": the file of another camera, or zoomed";
+    else
+      check.text += ": calibrate the camera again";
+    if (may_bend && !is_bent) check.text += "; a board that is not flat looks alike";
   }
   verdict.checks.push_back(std::move(check));
 }
@@ -116,6 +146,7 @@ void add_freed_distortion(const RangefinderReport& report, Verdict& verdict) {
 void add_shared_errors(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 3.5;
   for (const ShotCause& cause : report.causes) {
+    if (cause.name == "bent") continue;
     const bool is_quiet = cause.sigmas < ask_beyond;
     const std::string size =
         cause.unit == "m" ? text_of(1e3 * cause.size, 2) + " mm" : text_of(cause.size, 2) + " " + cause.unit;
@@ -220,6 +251,7 @@ void add_range_noise(const RangefinderReport& report, Verdict& verdict) {
 void add_cause_checks(const RangefinderReport& report, std::span<const Shot> shots, const RangefinderConfig& config,
                       Verdict& verdict) {
   add_scale(report, config, verdict);
+  add_bent_board(report, verdict);
   add_camera(report, verdict);
   add_freed_distortion(report, verdict);
   add_shared_errors(report, verdict);

@@ -54,6 +54,9 @@ INSTANTIATE_TEST_SUITE_P(
         ShotFault{"centre", [](RangefinderTrialSetup& s) { s.mistake.centre_px = 20.0; }, false},
         ShotFault{"distortion_small", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.01; }},
         ShotFault{"distortion", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.05; }},
+        ShotFault{"bow_small", [](RangefinderTrialSetup& s) { s.noise.bow_m = 0.0005; }},
+        ShotFault{"bow", [](RangefinderTrialSetup& s) { s.noise.bow_m = 0.0015; }},
+        ShotFault{"twist", [](RangefinderTrialSetup& s) { s.noise.twist_m = 0.0015; }},
         ShotFault{"drift_small", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.005, s.gives_lengths = true; }},
         ShotFault{"drift_of_a_centimetre",
                   [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.01, s.gives_lengths = true; }},
@@ -120,6 +123,25 @@ TEST(ShotFaults, AnOffsetOfTheReadingsIsPartOfTheOrigin) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
     good += rangefinder_trial(setup, seed).solved.verdict.state == State::good;
   EXPECT_GE(good, 9);
+}
+
+/// A bent board looks like another lens; by its corners' shape it is told apart, and another lens is.
+TEST(ShotFaults, ABentBoardIsNoOtherLensNorALensABentBoard) {
+  const auto says = [](const RangefinderTrialSetup& setup, std::uint64_t seed, const char* words) {
+    const Verdict verdict = rangefinder_trial(setup, seed).solved.verdict;
+    return (verdict.sentence + verdict.to_add).find(words) != std::string::npos;
+  };
+  for (const auto method : {RangefinderMethod::joint, RangefinderMethod::plane}) {
+    RangefinderTrialSetup bowed{.method = method}, twisted = bowed, zoomed = bowed;
+    bowed.noise.bow_m = twisted.noise.twist_m = 0.0015;
+    zoomed.mistake.focal = 0.02;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      EXPECT_TRUE(says(bowed, seed, "the board is not flat")) << seed;
+      EXPECT_TRUE(says(twisted, seed, "the board is not flat")) << seed;
+      EXPECT_FALSE(says(bowed, seed, "another camera") || says(twisted, seed, "another camera")) << seed;
+      EXPECT_FALSE(says(zoomed, seed, "the board is not flat")) << seed;
+    }
+  }
 }
 
 TEST(ShotFaults, CleanShotsStand) {

@@ -307,7 +307,7 @@ Verdict verdict_of_beam(const RangefinderReport& report, std::span<const Check> 
     // What is wrong comes before what follows from it.
     for (const std::string_view cause :
          {"shots agree", "spots by distance", "bend", "drift", "wander", "scale", "fit", "outliers", "boards", "camera",
-          "distortion", "spots outside", "columns", "mirrored"})
+          "distortion", "bent", "spots outside", "columns", "mirrored"})
       for (const Check& check : checks)
         if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
   }

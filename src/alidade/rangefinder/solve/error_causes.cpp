@@ -13,8 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What a cause does to the measurements of a shot: reading [m], spot [px] by its own size.
-using Share = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 2>;
+/// What a cause does to a shot's three errors by its own size: of its reading [m] and spot [px], or of its board [m].
+using Share = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
 
 /// How many residuals there are, and from how many of them each σ was estimated.
 struct Measured {
@@ -35,6 +35,14 @@ Measured measured_by(const BeamProblem& problem) {
   return measured;
 }
 
+/// How many of the corners' residuals their σ was estimated from; 0: it was given.
+double rows_of_corners(const BeamProblem& problem) {
+  double rows = 0.0;
+  for (const PreparedShot& shot : problem.shots)
+    if (shot.board && !problem.sigma_corner_px) rows += 2.0 * static_cast<double>(shot.board->corners.size()) - 6.0;
+  return rows;
+}
+
 /// Where the readings lie: centre and half of their span.
 std::pair<double, double> span_of_readings(const BeamProblem& problem) {
   double least = 0.0, most = 0.0;
@@ -49,14 +57,16 @@ std::pair<double, double> span_of_readings(const BeamProblem& problem) {
 template <typename ShareOf>
 std::optional<ShotCause> tested(const std::string& name, const std::string& unit, Index num, double num_estimated,
                                 const ReducedSystem& system, const SolvedPart& part, const VectorXd& g,
-                                const ShareOf& share_of) {
+                                const ShareOf& share_of, ErrorScore ReducedShot::*score = &ReducedShot::errors) {
   VectorXd s = VectorXd::Zero(num);
   MatrixXd I = MatrixXd::Zero(num, num), across = MatrixXd::Zero(num, static_cast<Index>(part.places.size()));
   for (const ReducedShot& shot : system.shots) {
+    const ErrorScore& of_shot = shot.*score;
+    if (of_shot.by_common.cols() == 0) continue;
     const Share share = share_of(shot.index);
-    s += share.transpose() * shot.errors.s;
-    I += share.transpose() * shot.errors.I * share;
-    across += share.transpose() * shot.errors.by_common(Eigen::all, part.places);
+    s += share.transpose() * of_shot.s;
+    I += share.transpose() * of_shot.I * share;
+    across += share.transpose() * of_shot.by_common(Eigen::all, part.places);
   }
   const VectorXd alone = I.diagonal();
   s -= across * part.inverse * g;
@@ -99,6 +109,10 @@ std::vector<ShotCause> error_causes(const BeamProblem& problem, const ReducedSys
     add(tested("bend", "m", 1, of_ranges, system, part, g, [&, at = middle_m, half = half_m](std::size_t index) {
       return Share(std::pow((problem.shots[index].range_m - at) / half, 2) * Eigen::Vector3d::UnitX());
     }));
+  if (std::ranges::any_of(system.shots, &ReducedShot::has_corners))
+    add(tested(
+        "bent", "m", 3, rows_of_corners(problem), system, part, g,
+        [](std::size_t) { return Share(Eigen::Matrix3d::Identity()); }, &ReducedShot::bend));
   if (measured.has_spots)
     add(tested("wander", "px", 2, of_spots, system, part, g, [&](std::size_t index) {
       return Share(over_rows(index) * Eigen::Matrix3d::Identity().rightCols<2>());

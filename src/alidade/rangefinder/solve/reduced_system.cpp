@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "alidade/board/board_bend.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/rangefinder/solve/fixed_distortion.h"
 
@@ -17,6 +18,15 @@ std::vector<int> lens_columns(const LensPrior& prior, const Camera& camera) {
     if (parameter > 3) columns.push_back(parameter);
   for (const int parameter : fixed_distortion(camera, prior.free)) columns.push_back(parameter);
   return columns;
+}
+
+/// What is left where the board's pose follows the errors; `by_pose`: their block with it.
+void eliminate_pose(const Eigen::Matrix<double, 3, 6>& by_pose, const CommonSystem::ShotBlock& block,
+                    ErrorScore& score) {
+  const Ldlt V(block.V);
+  score.s -= by_pose * V.solve(block.g);
+  score.I -= by_pose * V.solve_each(by_pose.transpose());
+  score.by_common -= by_pose * V.solve_each(block.W);
 }
 
 ErrorScore error_score(const BeamProblem& one, const LensPrior& all_of_lens, const CommonState& state,
@@ -35,11 +45,48 @@ ErrorScore error_score(const BeamProblem& one, const LensPrior& all_of_lens, con
   score.by_common.leftCols(num_beam_params) = D.transpose() * (block.whitener * residual->J_beam);
   score.by_common.rightCols(k) = D.transpose() * (block.whitener * residual->J_lens(Eigen::all, all_of_lens.free));
   if (!block.has_pose || !shot.plane) return score;
-  const Eigen::MatrixXd by_pose = D.transpose() * (block.whitener * residual->J_pose);
-  const Ldlt V(block.V);
-  score.s -= by_pose * V.solve(block.g);
-  score.I -= by_pose * V.solve_each(by_pose.transpose());
-  score.by_common -= by_pose * V.solve_each(block.W);
+  eliminate_pose(D.transpose() * (block.whitener * residual->J_pose), block, score);
+  return score;
+}
+
+/// Of the corners and of where the beam meets the board. A point that is higher is one of a board that is moved so far
+/// along its z.
+ErrorScore bend_score(const BeamProblem& one, const LensPrior& all_of_lens, const CommonState& state,
+                      const CommonSystem& system) {
+  constexpr int along_z = 2;  // of a pose's step
+  const auto k = static_cast<Index>(all_of_lens.free.size());
+  ErrorScore score;
+  score.by_common.setZero(3, num_beam_params + k);
+  const auto& block = system.blocks[0];
+  const Rigid3& cam_from_board = *state.cam_from_board[0];
+  const PreparedShot shot = at_state(one.shots[0], cam_from_board);
+  const auto corners =
+      corner_residuals(state.camera, cam_from_board, *shot.board, one.points_in_board, one.sigma_corner_px);
+  if (!corners) return score;
+  const BoardBend bend(one.points_in_board);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> D(corners->r.size(), 3);
+  for (Index row = 0; row < D.rows(); ++row) {
+    const auto point = static_cast<std::size_t>(shot.board->corners[static_cast<std::size_t>(row / 2)].index);
+    D.row(row) = corners->J_pose(row, along_z) * bend.heights_at(one.points_in_board[point]).transpose();
+  }
+  const Eigen::Matrix<double, 3, Eigen::Dynamic> weighed = D.transpose() / (shot.corner_factor * shot.corner_factor);
+  score.s = weighed * corners->r;
+  score.I = weighed * D;
+  score.by_common.rightCols(k) = weighed * corners->J_lens(Eigen::all, all_of_lens.free);
+  Eigen::Matrix<double, 3, 6> by_pose = weighed * corners->J_pose;
+  const auto residual = shot.used && shot.plane ? shot_residual(shot, state.beam, state.camera, one.model)
+                                                : std::optional<ShotResidual>{};
+  if (residual) {
+    const Eigen::Vector3d hit = cam_from_board.inverse() * point_at(state.beam, shot.range_m);
+    const Eigen::MatrixXd J_pose = block.whitener * residual->J_pose;
+    const Eigen::MatrixXd J = J_pose.col(along_z) * bend.heights_at(hit).transpose();
+    score.s += J.transpose() * (block.whitener * residual->r);
+    score.I += J.transpose() * J;
+    score.by_common.leftCols(num_beam_params) += J.transpose() * (block.whitener * residual->J_beam);
+    score.by_common.rightCols(k) += J.transpose() * (block.whitener * residual->J_lens(Eigen::all, all_of_lens.free));
+    by_pose += J.transpose() * J_pose;
+  }
+  eliminate_pose(by_pose, block, score);
   return score;
 }
 
@@ -47,10 +94,11 @@ std::optional<ReducedShot> reduced_shot(const BeamProblem& one, const LensPrior&
                                         const CommonState& state) {
   const auto system = common_system(one, all_of_lens, state);
   if (!system) return std::nullopt;
-  ReducedShot shot{0, false, system->U, system->g, error_score(one, all_of_lens, state, *system)};
+  ReducedShot shot{0, false, system->U, system->g, error_score(one, all_of_lens, state, *system), {}};
   const auto& block = system->blocks[0];
   if (!block.has_pose) return shot;
   shot.has_corners = true;
+  shot.bend = bend_score(one, all_of_lens, state, *system);
   const Ldlt V(block.V);
   shot.A.noalias() -= block.W.transpose() * V.solve_each(block.W);
   shot.g.noalias() -= block.W.transpose() * V.solve(block.g);

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// The same by what the shot's measurements could err by: of the reading [m], of the spot in u and in v [px].
+/// The same by three errors that a shot may have, as of the reading [m], of the spot in u and in v [px].
 struct ErrorScore {
   Eigen::Vector3d s = Eigen::Vector3d::Zero();  ///< ∂cost/2.
   Eigen::Matrix3d I = Eigen::Matrix3d::Zero();  ///< ∂²cost/2.
@@ -21,6 +21,7 @@ struct ReducedShot {
   Eigen::MatrixXd A;
   Eigen::VectorXd g;
   ErrorScore errors;
+  ErrorScore bend;  ///< By heights of the board: BoardBend. [m]
 };
 
 /// Normal equations at a solution, shot by shot, also of what was fixed there: the beam's six parameters [origin m,

@@ -103,6 +103,18 @@ TEST_F(RangefinderCommand, WhatIsGivenWithItsSigmaIsCarriedAndWhatIsNotIsNamed) 
   EXPECT_EQ(calibrate({"--sigma-scale", "-1"}).code, 2);
 }
 
+/// Shots know the ratio of readings and squares alone: a scale that is asked for is as good as the square.
+TEST_F(RangefinderCommand, AScaleThatIsAskedForNeedsTheSquaresSigma) {
+  simulate();
+  const Json without = Json::parse(calibrate({"--scale", "--json", "--no-report"}).out);
+  EXPECT_EQ(without["verdict"]["state"], "care");
+  EXPECT_THAT(without["verdict"]["sentence"].get<std::string>(), ::testing::HasSubstr("square_m is given without σ"));
+  EXPECT_EQ(without["verdict"]["to_add"], "measure the squares and give --sigma-square");
+  const Json with = Json::parse(calibrate({"--scale", "--sigma-square", "0.00002", "--json", "--no-report"}).out);
+  EXPECT_EQ(with["verdict"]["state"], "good") << with["verdict"];
+  EXPECT_NEAR(with["estimate"]["scale"], 1.0, 4.0 * with["stddev"]["scale"].get<double>());
+}
+
 TEST_F(RangefinderCommand, ProjectSaysWhereAFileHasNoCovariance) {
   simulate();
   const auto project = [&](const std::string& beam, const std::string& camera) {

@@ -114,10 +114,11 @@ void spoil(const TrackScene& scene, Draws& draws, SimulatedObservation& observat
     const Vector2d elsewhere(draws.uniform(0.0, camera.width_px - 1.0), draws.uniform(0.0, camera.height_px - 1.0));
     if (draws.uniform(0.0, 1.0) < faults.clutter) observation.px = elsewhere;
   }
+  if (faults.mirrored_all || (faults.mirrored && observation.head == 1))
+    observation.px.x() = camera.width_px - 1.0 - observation.px.x();
   if (observation.head == 1) {
     observation.t_capture_s += faults.clock_s;
     observation.t_arrival_s += faults.clock_s;
-    if (faults.mirrored) observation.px.x() = camera.width_px - 1.0 - observation.px.x();
     if (faults.pan_sign) observation.pan_tilt_rad.x() *= -1.0;
     if (faults.tilt_sign) observation.pan_tilt_rad.y() *= -1.0;
   }

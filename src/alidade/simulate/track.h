@@ -34,6 +34,7 @@ struct TrackFaults {
   double second = 0.0;    ///< Share of the observations that are of another target, 0.4 m to the right and 0.1 m above.
   bool swapped = false;   ///< The heads' names.
   bool mirrored = false;  ///< Its images, left to right.
+  bool mirrored_all = false;                 ///< Those of all heads.
   bool pan_sign = false, tilt_sign = false;  ///< Its angles, reversed.
 };
 

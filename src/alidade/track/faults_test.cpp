@@ -107,6 +107,24 @@ TEST(TrackFaults, AreNamedAndNeverCalledGood) {
   }
 }
 
+/// Heads that follow keep the target central, where mirrored images nearly fit: their handedness is looked at before
+/// clocks, times and the target's motion.
+TEST(TrackFaults, MirroredImagesOfAllHeadsAreNamedFirst) {
+  const int draws = testing::trials(10);
+  for (const char* scenario : {"A2", "B", "C", "G"}) {
+    const TrackScene scene = faulty(scenario, [](TrackFaults& f) { f.mirrored_all = true; });
+    int num_named = 0;
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(draws); ++seed) {
+      const Judged result = judged(scene, seed);
+      const bool is_named = result.verdict.sentence.find("images of all heads are mirrored") != std::string::npos;
+      num_named += is_named ? 1 : 0;
+      EXPECT_TRUE(is_named) << scenario << " " << seed << ": " << result.verdict.sentence;
+      EXPECT_FALSE(result.verdict.ok()) << scenario << " " << seed;
+    }
+    EXPECT_EQ(num_named, draws) << scenario;
+  }
+}
+
 /// Draws of each scenario (ALIDADE_TEST_TRIALS=40: forty), the rig being what its file says, exactly. D hides the
 /// target from a head for two seconds, which is reported.
 TEST(TrackFaults, CleanScenariosAreGood) {

@@ -10,26 +10,14 @@
 
 #include "alidade/estimation/verdict.h"
 #include "alidade/track/checks/clock_shift.h"
+#include "alidade/track/checks/rig_faults.h"
 
 namespace alidade {
-namespace {
 
-using Observations = std::vector<TargetObservation>;
-
-struct Hypothesis {
-  Explanation explanation;
-  std::function<void(TargetObservation&)> apply;
-};
-
-struct Trial {
-  double ln_p = -std::numeric_limits<double>::infinity();
-  bool fits = false;
-};
-
-/// How the observations fare, the target being as manoeuvring as suits them best.
-Trial tried(const Observations& observations, std::span<const RigHead> heads, const FollowConfig& config) {
+Trial tried(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+            const FollowConfig& config) {
   constexpr double min_used = 0.9, nis_that_fits = 1.7, max_restarts = 0.01;
-  Trial best;
+  Trial best{.ln_p = -std::numeric_limits<double>::infinity()};
   FollowConfig plain = config;
   plain.judge = plain.find_sigma_a = false;
   for (const double sigma_a : {0.1, 1.0, 8.0}) {
@@ -53,38 +41,62 @@ Trial tried(const Observations& observations, std::span<const RigHead> heads, co
   return best;
 }
 
+namespace {
+
+using Observations = std::vector<TargetObservation>;
+
+struct Hypothesis {
+  Explanation explanation;
+  std::function<void(TargetObservation&)> apply;
+};
+
 std::string head_name(std::span<const RigHead> heads, std::size_t head) {
   return "head " + std::to_string(heads[head].head.id);
 }
 
-/// The signs and mirrors of one head, or of all.
-void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
+using Change = std::function<void(TargetObservation&)>;
+
+/// Of one head's observations, or of all.
+Hypothesis hypothesis_of(std::optional<std::size_t> head, const std::string& what, const std::string& to_do,
+                         const Change& change) {
+  return {{what, to_do}, [head, change](TargetObservation& observation) {
+            if (!head || observation.head == *head) change(observation);
+          }};
+}
+
+/// The signs of one head, or of all.
+void add_signs(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
   const std::string of = head ? " of " + head_name(heads, *head) : "";
-  const auto add = [&](const std::string& what, const std::string& to_do,
-                       std::function<void(TargetObservation&)> change) {
-    all.push_back({{what, to_do}, [head, change](TargetObservation& observation) {
-                     if (!head || observation.head == *head) change(observation);
-                   }});
-  };
-  add("pan" + of + " with the wrong sign", "pan > 0 turns left: with the sign reversed the events fit the rig",
-      [](TargetObservation& observation) { observation.pan_tilt_rad.x() *= -1.0; });
-  add("tilt" + of + " with the wrong sign", "tilt > 0 turns up: with the sign reversed the events fit the rig",
-      [](TargetObservation& observation) { observation.pan_tilt_rad.y() *= -1.0; });
+  all.push_back(hypothesis_of(head, "pan" + of + " with the wrong sign",
+                              "pan > 0 turns left: with the sign reversed the events fit the rig",
+                              [](TargetObservation& observation) { observation.pan_tilt_rad.x() *= -1.0; }));
+  all.push_back(hypothesis_of(head, "tilt" + of + " with the wrong sign",
+                              "tilt > 0 turns up: with the sign reversed the events fit the rig",
+                              [](TargetObservation& observation) { observation.pan_tilt_rad.y() *= -1.0; }));
+}
+
+/// The mirrors of one head, or of all.
+void add_mirrors(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
   const auto mirrored = [heads](TargetObservation& observation, int axis) {
     const Camera& camera = heads[observation.head].camera;
     observation.px[axis] = (axis == 0 ? camera.width_px : camera.height_px) - 1.0 - observation.px[axis];
   };
-  const std::string whose = head ? head_name(heads, *head) : "all heads";
-  add("the images of " + whose + " are mirrored", "mirror u: then the events fit the rig",
-      [mirrored](TargetObservation& observation) { mirrored(observation, 0); });
-  add("the images of " + whose + " are flipped upside down", "mirror v: then the events fit the rig",
-      [mirrored](TargetObservation& observation) { mirrored(observation, 1); });
-  add("the images of " + whose + " are rotated by half a turn",
-      "that camera hangs upside down: mirror u and v, or say so in the rig's cam_from_tilt",
-      [mirrored](TargetObservation& observation) {
-        mirrored(observation, 0);
-        mirrored(observation, 1);
-      });
+  const std::string images = "the images of " + (head ? head_name(heads, *head) : "all heads");
+  all.push_back(hypothesis_of(head, images + " are mirrored", "mirror u: then the events fit the rig",
+                              [mirrored](TargetObservation& observation) { mirrored(observation, 0); }));
+  all.push_back(hypothesis_of(head, images + " are flipped upside down", "mirror v: then the events fit the rig",
+                              [mirrored](TargetObservation& observation) { mirrored(observation, 1); }));
+  all.push_back(hypothesis_of(head, images + " are rotated by half a turn",
+                              "that camera hangs upside down: mirror u and v, or say so in the rig's cam_from_tilt",
+                              [mirrored](TargetObservation& observation) {
+                                mirrored(observation, 0);
+                                mirrored(observation, 1);
+                              }));
+}
+
+void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
+  add_signs(heads, head, all);
+  add_mirrors(heads, head, all);
 }
 
 std::vector<Hypothesis> hypotheses(std::span<const RigHead> heads) {
@@ -137,15 +149,32 @@ std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) 
          (shift.rival.empty() ? "" : "; " + rival + " explains them as well");
 }
 
-std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
-                                          std::span<const RigHead> heads, const FollowConfig& config) {
-  constexpr std::size_t max_observations = 1200, first_observations = 160;
-  constexpr double min_gain = 30.0, clear = 15.0;
-  Observations given = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
-  std::erase_if(given, [&](const TargetObservation& observation) { return observation.head >= heads.size(); });
+namespace {
+
+constexpr double clear = 15.0;  // of ln p: by chance alone never
+
+/// The first observations, in order of capture.
+Observations some_of(std::span<const TargetObservation> observations, std::span<const RigHead> heads) {
+  constexpr std::size_t max_observations = 1200;
+  Observations some = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
+  std::erase_if(some, [&](const TargetObservation& observation) { return observation.head >= heads.size(); });
+  return some;
+}
+
+struct Likelier {
+  double ln_p = 0.0;
+  Explanation explanation;
+  Observations observations;  ///< As they would be.
+};
+
+/// The hypothesis under which observations fit and are by far more probable; two of them where they are nearly alike.
+std::optional<Likelier> likeliest(const Observations& given, std::span<const RigHead> heads, const FollowConfig& config,
+                                  std::span<const Hypothesis> all) {
+  constexpr std::size_t first_observations = 160;
+  constexpr double min_gain = 30.0, of_gain = 0.03;  // no motion model is right to more
   const double as_given = tried(given, heads, config).ln_p;
-  std::vector<std::pair<double, Explanation>> fitting;
-  for (const Hypothesis& hypothesis : hypotheses(heads)) {
+  std::vector<Likelier> fitting;
+  for (const Hypothesis& hypothesis : all) {
     Observations changed = given;
     for (TargetObservation& observation : changed) hypothesis.apply(observation);
     changed = with_shift(changed, {});
@@ -154,14 +183,58 @@ std::optional<Explanation> explanation_of(std::span<const TargetObservation> obs
         changed.begin(), changed.begin() + static_cast<std::ptrdiff_t>(std::min(changed.size(), first_observations)));
     if (changed.size() > 2 * first_observations && !tried(some, heads, config).fits) continue;
     const Trial trial = tried(changed, heads, config);
-    if (trial.fits && trial.ln_p > as_given + min_gain) fitting.emplace_back(trial.ln_p, hypothesis.explanation);
+    if (trial.fits && trial.ln_p > as_given + min_gain)
+      fitting.push_back({trial.ln_p, hypothesis.explanation, std::move(changed)});
   }
-  if (fitting.empty()) return foreign_head(given, heads, config);
-  std::ranges::stable_sort(fitting, std::ranges::greater{}, &std::pair<double, Explanation>::first);
-  Explanation best = fitting.front().second;
-  if (fitting.size() > 1 && fitting[1].first > fitting[0].first - clear)
-    best = {best.what + ", or " + fitting[1].second.what, best.to_do};
+  if (fitting.empty()) return std::nullopt;
+  std::ranges::stable_sort(fitting, std::ranges::greater{}, &Likelier::ln_p);
+  Likelier best = fitting.front();
+  const double near = std::max(clear, of_gain * (best.ln_p - as_given));
+  if (fitting.size() > 1 && fitting[1].ln_p > best.ln_p - near)
+    best.explanation = {best.explanation.what + ", or " + fitting[1].explanation.what, best.explanation.to_do};
   return best;
+}
+
+/// Of a target that moves as it is said to, or that may fall, whichever is more probable.
+double ln_p_of(const Observations& observations, std::span<const RigHead> heads, FollowConfig config) {
+  const double as_said = tried(observations, heads, config).ln_p;
+  config.tracker.method = TargetMotion::imm;
+  return std::max(as_said, tried(observations, heads, config).ln_p);
+}
+
+/// How probable the observations are under the likeliest other thing that may be amiss.
+double ln_p_of_rivals(const Observations& given, std::span<const RigHead> heads, const FollowConfig& config,
+                      std::span<const RigFault> faults) {
+  double most = ln_p_of(given, heads, config);
+  for (const RigFault& fault : faults) {
+    const WithoutFault right = without_fault(given, heads, fault);
+    most = std::max(most, ln_p_of(with_shift(right.observations, {}), right.heads, config));
+  }
+  if (const auto shift = probable_clock_shift(given, heads, config))
+    most = std::max(most, ln_p_of(with_shift(given, *shift), heads, config));
+  return most;
+}
+
+}  // namespace
+
+std::optional<Explanation> mirrored_images(std::span<const TargetObservation> observations,
+                                           std::span<const RigHead> heads, const FollowConfig& config,
+                                           std::span<const RigFault> faults) {
+  std::vector<Hypothesis> all;
+  add_mirrors(heads, std::nullopt, all);
+  for (std::size_t head = 0; head < std::min<std::size_t>(heads.size(), 4); ++head) add_mirrors(heads, head, all);
+  const Observations given = some_of(observations, heads);
+  auto best = likeliest(given, heads, config, all);
+  if (!best || !(ln_p_of(best->observations, heads, config) > ln_p_of_rivals(given, heads, config, faults) + clear))
+    return std::nullopt;
+  return std::move(best->explanation);
+}
+
+std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
+                                          std::span<const RigHead> heads, const FollowConfig& config) {
+  const Observations given = some_of(observations, heads);
+  if (auto best = likeliest(given, heads, config, hypotheses(heads))) return std::move(best->explanation);
+  return foreign_head(given, heads, config);
 }
 
 namespace {
@@ -210,6 +283,45 @@ Explanation why_no_start(std::span<const TargetObservation> observations, std::s
   return {"the two heads' rays do not meet within " + text_of(config.tracker.min_depth_m, 2) + " to " +
               text_of(config.tracker.max_depth_m, 2) + " m",
           "check the rig file, or widen the working range"};
+}
+
+namespace {
+
+constexpr double good_share = 0.95;  // of the observations, used
+
+double ln_p(const TrackReport& report, double gate) {
+  return report.log_likelihood - gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
+}
+
+}  // namespace
+
+std::optional<Check> falling_target(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                    const FollowConfig& config) {
+  constexpr std::size_t max_observations = 1200;
+  constexpr double min_gain = 20.0;
+  const TargetMotion method = config.tracker.method;
+  if (method == TargetMotion::imm || method == TargetMotion::ballistic) return std::nullopt;
+  FollowConfig plain = config;
+  plain.judge = false;
+  const Observations some = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
+  const double as_given = ln_p(track_target(some, heads, plain), config.tracker.gate);
+  plain.tracker.method = TargetMotion::imm;
+  const TrackReport falls = track_target(some, heads, plain);
+  // Where the noise is larger than stated, so is every logarithm: less by what is left of it (QAIC).
+  const double gain = (ln_p(falls, config.tracker.gate) - as_given) / std::max(1.0, falls.nis_per_dof);
+  // It explains only what then fits: of clutter both reject as much.
+  if (falls.num_starts == 0 || !(gain > min_gain) ||
+      static_cast<double>(falls.num_used) < good_share * static_cast<double>(some.size()))
+    return std::nullopt;
+  return Check{
+      "falls",
+      State::care,
+      "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
+          text_of(gain, 2) + ")",
+      gain,
+      min_gain,
+      "1",
+      "track"};
 }
 
 }  // namespace alidade

@@ -16,6 +16,21 @@ struct Explanation {
   bool is_foreign_head = false;  ///< One head agrees with none of the others: by its pose, or by its clock.
 };
 
+/// How observations fare under a hypothesis, the target being as manoeuvring as suits them best.
+struct Trial {
+  double ln_p = 0.0;  ///< But for a constant.
+  bool fits = false;
+};
+[[nodiscard]] Trial tried(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                          const FollowConfig& config);
+
+/// Images of all heads, or of one, that are mirrored, flipped or rotated by half a turn: heads that follow keep the
+/// target near the centre, so that mirrored observations nearly fit. None where the observations fit no better so, or
+/// where one of these explains them as well: `faults` of the rig, a clock, a target that falls.
+[[nodiscard]] std::optional<Explanation> mirrored_images(std::span<const TargetObservation> observations,
+                                                         std::span<const RigHead> heads, const FollowConfig& config,
+                                                         std::span<const RigFault> faults);
+
 /// Swapped heads, a wrong sign of an angle or a mirrored image, of all heads or of one, degrees, a head that is not
 /// the rig's: the one under which the observations fit and are the most probable. Two of them where they are nearly
 /// equally probable; none where none lets the observations fit.
@@ -32,5 +47,9 @@ struct Explanation {
 /// Why no track began although there were two heads at a time.
 [[nodiscard]] Explanation why_no_start(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                        const FollowConfig& config);
+
+/// Observations that do not fit, and do where the target may fall.
+[[nodiscard]] std::optional<Check> falling_target(std::span<const TargetObservation> observations,
+                                                  std::span<const RigHead> heads, const FollowConfig& config);
 
 }  // namespace alidade

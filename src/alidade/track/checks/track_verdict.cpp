@@ -166,34 +166,6 @@ std::optional<Check> second_target(const TrackReport& report, std::span<const Ta
                used_share(second), min_share, "1");
 }
 
-double ln_p(const TrackReport& report, double gate) {
-  return report.log_likelihood - gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
-}
-
-/// Observations that do not fit, and do where the target may fall.
-std::optional<Check> falling_target(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                                    const FollowConfig& config) {
-  constexpr std::size_t max_observations = 1200;
-  constexpr double min_gain = 20.0;
-  const TargetMotion method = config.tracker.method;
-  if (method == TargetMotion::imm || method == TargetMotion::ballistic) return std::nullopt;
-  FollowConfig plain = config;
-  plain.judge = false;
-  const Observations some = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
-  const double as_given = ln_p(track_target(some, heads, plain), config.tracker.gate);
-  plain.tracker.method = TargetMotion::imm;
-  const TrackReport falls = track_target(some, heads, plain);
-  // Where the noise is larger than stated, so is every logarithm: less by what is left of it (QAIC).
-  const double gain = (ln_p(falls, config.tracker.gate) - as_given) / std::max(1.0, falls.nis_per_dof);
-  // It explains only what then fits: of clutter both reject as much.
-  if (falls.num_starts == 0 || !(gain > min_gain) || used_share(falls) < 1.0 - care_rejected) return std::nullopt;
-  return check(
-      "falls", State::care,
-      "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
-          text_of(gain, 2) + ")",
-      gain, min_gain, "1");
-}
-
 /// What of the observations as a whole is not as stated.
 struct Causes {
   std::optional<Fault> mistake;
@@ -214,6 +186,10 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
   const bool is_explained = is_explained_by_fault(report);
+  if (report.num_starts > 0 && (is_doubtful(report) || report.num_restarts > 0 || report.jitter)) {
+    causes.mistake = mirrored_images(observations, heads, found, alike_per_head(report));
+    if (causes.mistake) return causes;
+  }
   if (report.num_starts > 0 && !is_explained && report.frozen.empty() && is_doubtful(report))
     causes.other = other_object(observations, heads, config, report);
   if (causes.other) return causes;
@@ -276,11 +252,11 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
                  "give them in order of capture, or check t_capture_s of each head: their clocks may differ by that"};
   if (causes.other && !fits(report))
     return Fault{other_object_text(*causes.other, heads), other_object_remedy(*causes.other, heads)};
+  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_rejected)) return causes.mistake;
   if (is_explained_by_fault(report) && !fits(report))
     return Fault{"only " + text_of(100.0 * used_share(report), 2) +
                      " % of the observations fit one track and this rig: " + fault_text(report),
                  fault_remedy(report, heads)};
-  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_rejected)) return causes.mistake;
   if (fits(report)) return std::nullopt;
   if (causes.shift)
     return Fault{clocks_text(causes, heads),
@@ -349,12 +325,12 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
                    std::span<const RigHead> heads, const FollowConfig& config, std::size_t num_given) {
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
   Causes causes = causes_of(report, observations, heads, config);
-  causes.step_s = step_that_explains(observations, report, causes.shift);
+  if (!causes.mistake) causes.step_s = step_that_explains(observations, report, causes.shift);
   if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
   Verdict verdict;
   add_frozen(report, heads, verdict);
   if (causes.other) add_other(*causes.other, heads, verdict);
-  if (report.jitter)
+  if (report.jitter && !causes.mistake)
     verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
                                    1e3 * report.jitter->sigma_s, 0.0, "ms"));
   add_clocks(report, causes, heads, verdict);
@@ -369,6 +345,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   set_times_remedy(report, causes, verdict);
   set_frozen_remedy(report, heads, verdict);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
+  if (causes.mistake) verdict.to_add = causes.mistake->to_do;
   if (causes.other) verdict.to_add = other_object_remedy(*causes.other, heads);
   verdict.sentence = sentence_of(report, num_given, verdict);
   return verdict;

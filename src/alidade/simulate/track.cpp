@@ -123,6 +123,7 @@ void spoil(const TrackScene& scene, Draws& draws, SimulatedObservation& observat
     if (faults.tilt_sign) observation.pan_tilt_rad.y() *= -1.0;
   }
   if (faults.swapped && observation.head < 2) observation.head = 1 - observation.head;
+  if (faults.milliseconds) observation.t_capture_s *= 1e3, observation.t_arrival_s *= 1e3;
 }
 
 void add_observations(const TrackScene& given, std::size_t head, std::uint64_t seed,

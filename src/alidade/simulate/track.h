@@ -35,6 +35,7 @@ struct TrackFaults {
   bool swapped = false;   ///< The heads' names.
   bool mirrored = false;  ///< Its images, left to right.
   bool mirrored_all = false;                 ///< Those of all heads.
+  bool milliseconds = false;                 ///< All times are in them.
   bool pan_sign = false, tilt_sign = false;  ///< Its angles, reversed.
 };
 

@@ -125,6 +125,19 @@ TEST(TrackFaults, MirroredImagesOfAllHeadsAreNamedFirst) {
   }
 }
 
+TEST(TrackFaults, TimesInMillisecondsAreNamed) {
+  for (const char* scenario : {"A2", "B", "C", "E", "G"}) {
+    const TrackScene scene = faulty(scenario, [](TrackFaults& f) { f.milliseconds = true; });
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const Verdict verdict = judged(scene, seed).verdict;
+      EXPECT_TRUE(verdict.state != State::good) << scenario << " " << seed;
+      EXPECT_NE(verdict.sentence.find("are these milliseconds? t_capture_s is in seconds"), std::string::npos)
+          << scenario << " " << seed << ": " << verdict.sentence;
+      EXPECT_EQ(verdict.to_add, "give t_capture_s and t_arrival_s in seconds") << scenario << " " << seed;
+    }
+  }
+}
+
 /// Draws of each scenario (ALIDADE_TEST_TRIALS=40: forty), the rig being what its file says, exactly. D hides the
 /// target from a head for two seconds, which is reported.
 TEST(TrackFaults, CleanScenariosAreGood) {

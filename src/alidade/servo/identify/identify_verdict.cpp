@@ -4,6 +4,7 @@
 
 #include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/geometry/time_unit.h"
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/identify_flaws.h"
@@ -175,7 +176,7 @@ void add_excitation(std::span<const ServoSample> log, const ServoIdentification&
 
 /// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
 void add_readings(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
-  constexpr double max_turn_rad = 6.2831853071795865, max_spacing_s = 1.0;
+  constexpr double max_turn_rad = 6.2831853071795865;
   constexpr double max_rate_rad_s = 20.0;  // more than a thousand degrees a second: no head rotates so fast
   const double range = identified.angle_range_rad;
   if (range > max_turn_rad && identified.fit.kind == ServoKind::angle)
@@ -198,10 +199,11 @@ void add_readings(std::span<const ServoSample> log, const ServoIdentification& i
                                   text_of(1e3 * identified.sigma_time_s, 2) + " ms (σ): counted in σ",
                               identified.sigma_time_score, sigmas_of_time_stamps, "σ", ""});
   const double spacing_s = identified.duration_s / (static_cast<double>(log.size()) - 1.0);
-  if (spacing_s > max_spacing_s)
-    verdict.checks.push_back({"times", State::care,
-                              "rows are " + text_of(spacing_s) + " s apart: are these milliseconds? t_s is in seconds",
-                              spacing_s, max_spacing_s, "s", ""});
+  if (const auto unit = time_unit_by_spacing(spacing_s))
+    verdict.checks.push_back(
+        {"times", State::care,
+         "rows are " + text_of(spacing_s) + " s apart: are these " + unit->name + "? t_s is in seconds", spacing_s, 1.0,
+         "s", ""});
   const double step_rad = encoder_step_rad(log);
   // Rounding errs by step/√12; beyond two of the noise's σ it is no longer spread by the noise.
   if (step_rad > 2.0 * identified.fit.rms_rad)

@@ -9,7 +9,9 @@
 
 #include "alidade/estimation/median.h"
 #include "alidade/estimation/verdict.h"
+#include "alidade/geometry/time_unit.h"
 #include "alidade/track/checks/clock_shift.h"
+#include "alidade/track/checks/explanation.h"
 #include "alidade/track/checks/rig_faults.h"
 
 namespace alidade {
@@ -215,6 +217,46 @@ std::string rounding_text(double step_s) {
 std::string rounding_remedy(double step_s) {
   // RMS of what rounding down takes: uniform from 0 to the step.
   return "write t_capture_s as exactly as it is known, or give --sigma-clock " + text_of(step_s / std::sqrt(3.0), 2);
+}
+
+namespace {
+
+/// Between one row of a head and its next, of the head that is seen the most often.
+double usual_spacing_s(std::span<const TargetObservation> observations, std::size_t num_heads) {
+  double least_s = std::numeric_limits<double>::infinity();
+  for (std::size_t head = 0; head < num_heads; ++head) {
+    std::vector<TargetObservation> own(observations.begin(), observations.end());
+    std::erase_if(own, [head](const TargetObservation& observation) { return observation.head != head; });
+    const std::vector<double> times = times_of(own);
+    std::vector<double> apart_s;
+    for (std::size_t k = 1; k < times.size(); ++k) apart_s.push_back(times[k] - times[k - 1]);
+    if (!apart_s.empty()) least_s = std::min(least_s, median_of(apart_s));
+  }
+  return std::isfinite(least_s) ? least_s : 0.0;
+}
+
+}  // namespace
+
+std::optional<Check> unit_of_times(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                   const FollowConfig& config) {
+  constexpr std::size_t max_observations = 1200;
+  constexpr double min_gain = 30.0;
+  const double spacing_s = usual_spacing_s(observations, heads.size());
+  const auto unit = time_unit_by_spacing(spacing_s);
+  if (!unit) return std::nullopt;
+  std::vector<TargetObservation> given =
+      with_shift(observations.first(std::min(observations.size(), max_observations)), {});
+  const double as_given = tried(given, heads, config).ln_p;
+  for (TargetObservation& observation : given) observation.t_capture_s *= unit->seconds;
+  const Trial as_that = tried(with_shift(given, {}), heads, config);
+  if (!as_that.fits || !(as_that.ln_p > as_given + min_gain)) return std::nullopt;
+  return Check{"times",
+               State::care,
+               "rows are " + text_of(spacing_s) + " s apart: are these " + unit->name + "? t_capture_s is in seconds",
+               spacing_s,
+               1.0,
+               "s",
+               "track"};
 }
 
 }  // namespace alidade

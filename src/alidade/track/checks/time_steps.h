@@ -51,4 +51,10 @@ void count_rounding(double step_s, TrackReport& report);
 [[nodiscard]] std::string rounding_text(double step_s);
 [[nodiscard]] std::string rounding_remedy(double step_s);
 
+/// The check "times" where they are in another unit than seconds: rows are far apart, and as that unit the observations
+/// are far more probable. None: they are in seconds.
+[[nodiscard]] std::optional<Check> unit_of_times(std::span<const TargetObservation> observations,
+                                                 std::span<const RigHead> heads, const FollowConfig& config);
+inline constexpr const char* unit_remedy = "give t_capture_s and t_arrival_s in seconds";
+
 }  // namespace alidade

@@ -326,8 +326,11 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
   Causes causes = causes_of(report, observations, heads, config);
   if (!causes.mistake) causes.step_s = step_that_explains(observations, report, causes.shift);
+  const auto unit = unit_of_times(observations, heads, config);
+  if (unit && !fits(report)) return refused({unit->text, unit_remedy});
   if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
   Verdict verdict;
+  if (unit) verdict.checks.push_back(*unit);
   add_frozen(report, heads, verdict);
   if (causes.other) add_other(*causes.other, heads, verdict);
   if (report.jitter && !causes.mistake)
@@ -347,6 +350,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   if (causes.mistake) verdict.to_add = causes.mistake->to_do;
   if (causes.other) verdict.to_add = other_object_remedy(*causes.other, heads);
+  if (unit) verdict.to_add = unit_remedy;
   verdict.sentence = sentence_of(report, num_given, verdict);
   return verdict;
 }

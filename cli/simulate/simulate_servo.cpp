@@ -19,6 +19,7 @@ constexpr double no_limit_deg_s = 1e6;
 struct SimulateServoArgs {
   std::string kind = "angle", unit = "deg";
   bool chirp = false, one_step = false;
+  int commands_per_row = 1;
   double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = no_limit_deg_s, max_acceleration_deg_s2 = 1e9;
   double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0;
   Mode resonance{.hz = 0.0, .damping = 0.05, .share = 1.0};
@@ -48,6 +49,7 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
   scene.amplitude = args.amplitude;
   scene.duration_s = args.duration_s;
   scene.rate_hz = args.rate_hz;
+  scene.commands_per_row = args.commands_per_row;
   scene.zero_rad = deg * args.zero_deg;
   scene.sigma_rad = deg * args.sigma_deg;
   scene.encoder_step_rad = deg * args.step_deg;
@@ -55,7 +57,7 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
 }
 
 ExitCode simulate_servo(const SimulateServoArgs& args, Run& run) {
-  if (args.duration_s * args.rate_hz > 1e6) throw UsageError("--rate-hz: makes more than a million rows");
+  if (args.duration_s * args.rate_hz * args.commands_per_row > 1e6) throw UsageError("--rate-hz: makes more than a million rows");
   const ServoLogScene scene = scene_of(args);
   std::vector<ServoSample> samples;
   for (const ServoLogRow& row : simulate_servo_log(scene, run.options.seed))
@@ -113,6 +115,11 @@ void add_servo_scenario(App& app) {
   add_number(command, "--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
   add_number(command, "--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
   add_number(command, "--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);
+  command
+      .add_option("--commands-per-row", args->commands_per_row,
+                  "Commands from row to row, as of a controller that is faster than its log (with --chirp)")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
   add_number(command, "--sigma-deg", args->sigma_deg, "Noise of the encoder", 0.0, 90.0);
   add_number(command, "--step-deg", args->step_deg, "One count of the encoder; 0: it does not round", 0.0, 90.0);
   add_number(command, "--zero-deg", args->zero_deg, "What the encoder reads at angle zero", -360.0, 360.0);

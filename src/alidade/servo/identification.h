@@ -156,7 +156,10 @@ struct ServoIdentification {
   std::vector<double> sampled_t_s;   ///< Of each row, then.
   std::vector<double> command_t_s;   ///< Where commands were given before their rows: each row's, as estimated.
   std::size_t num_command_times = 0;
-  double sigma_command_s = 0.0;  ///< Of what all of them may have been given earlier, which no log shows; in the σ.
+  double sigma_command_s = 0.0;  ///< Of what all of them may have been given earlier, as far as it is open; in the σ.
+  bool has_frequent_commands = false;  ///< They change from row to row, and the log has no times of theirs.
+  /// Of such: so many are given in the usual time between two rows, 1000: all the time; 0: each at its row.
+  std::size_t commands_per_row = 0;
   std::vector<std::size_t> lost_commands;  ///< Rows whose command the axis did not follow; the one before held on.
   std::vector<ZeroSlip> slips;             ///< Of the encoder's zero, estimated with the fit.
   double lag_one_correlation = 0.0;        ///< Of the residuals, one row to the next: near 0 where the model is enough.

@@ -203,16 +203,20 @@ std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uin
   SwingingAxis axis(prompt, scene.mode);
   std::deque<ServoLogRow> waiting;
   std::vector<ServoLogRow> rows;
+  const int per_row = std::max(1, scene.commands_per_row);
+  const double rate_hz = scene.rate_hz * per_row;
   const int num_rows = static_cast<int>(std::floor(scene.duration_s * scene.rate_hz)) + 1;
-  for (int k = 0; k < num_rows; ++k) {
+  for (int k = 0; k <= (num_rows - 1) * per_row; ++k) {
     ServoLogRow row;
-    row.t_s = k / scene.rate_hz;
+    row.t_s = k / rate_hz;
     row.command = command_of(scene, row.t_s);
-    row.angle_rad =
-        rounded_to(scene.zero_rad + axis.angle_rad() + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
-    rows.push_back(row);
+    if (k % per_row == 0) {
+      row.angle_rad =
+          rounded_to(scene.zero_rad + axis.angle_rad() + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
+      rows.push_back(row);
+    }
     waiting.push_back(row);
-    const double next_s = (k + 1) / scene.rate_hz;
+    const double next_s = (k + 1) / rate_hz;
     double now_s = row.t_s;
     for (; !waiting.empty() && waiting.front().t_s + scene.axis.command_delay_s <= next_s; waiting.pop_front()) {
       const double acts_s = std::max(now_s, waiting.front().t_s + scene.axis.command_delay_s);

@@ -60,6 +60,7 @@ struct ServoLogScene {
   bool is_chirp = false;
   double amplitude = 200.0;  ///< Of the command.
   double duration_s = 5.0, rate_hz = 100.0;
+  int commands_per_row = 1;  ///< Commands change so often from row to row; a row has the one that is valid from then on.
   double step_at_s = 0.5, hold_s = 0.9;                   ///< The first step, and each until the next.
   std::vector<double> steps{1.0, -0.5, 0.25, -1.0, 0.5};  ///< Of the amplitude, over and over; one: it stays.
   double low_hz = 0.1, high_hz = 3.0;                     ///< Of the chirp.

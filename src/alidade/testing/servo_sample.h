@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -22,6 +24,13 @@ inline ServoLogScene late_scene(bool is_rate_plant, RatePlant plant = {0.005, An
   if (is_rate_plant) scene.axis.plant = plant;
   scene.axis.command_delay_s = 0.083;
   return scene;
+}
+
+/// Of gain, time constant or latency.
+inline double error_in_sigma(const ServoFit& fit, const ServoLogScene& scene, int param) {
+  const ServoAxis& axis = scene.axis;
+  const std::array<double, 3> truth{gain_of(axis.plant), tau_of(axis.plant), axis.command_delay_s};
+  return (fit.params[param] - truth[static_cast<std::size_t>(param)]) / std::sqrt(fit.cov(param, param));
 }
 
 /// 2.5 s of it, and a fit as a response is asked of, with τ 0.1 s, latency 83 ms and zero 0.2 rad.

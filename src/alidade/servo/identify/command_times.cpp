@@ -22,13 +22,6 @@ struct EarlierCommand {
   double most_s = 0.0, mean_s = 0.0, sigma_s = 0.0;
 };
 
-double usual_spacing(std::span<const ServoSample> log) {
-  std::vector<double> spacings;
-  for (std::size_t i = 1; i < log.size(); ++i) spacings.push_back(log[i].t_s - log[i - 1].t_s);
-  std::ranges::nth_element(spacings, spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2));
-  return spacings[spacings.size() / 2];
-}
-
 /// Of every command that changes, where commands are given between rows; where they are given at rows, of those whose
 /// row may be among lost ones.
 std::vector<EarlierCommand> earlier_commands(std::span<const ServoSample> log, bool between_rows) {
@@ -238,6 +231,13 @@ std::optional<CommandTimes> estimated(std::span<const ServoSample> log, const Se
 }
 
 }  // namespace
+
+double usual_spacing(std::span<const ServoSample> log) {
+  std::vector<double> spacings;
+  for (std::size_t i = 1; i < log.size(); ++i) spacings.push_back(log[i].t_s - log[i - 1].t_s);
+  std::ranges::nth_element(spacings, spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2));
+  return spacings[spacings.size() / 2];
+}
 
 std::optional<CommandTimes> command_times(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr double clear = 12.0;

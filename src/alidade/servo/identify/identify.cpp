@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/servo/identify/frequent_commands.h"
 #include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/identify_clusters.h"
 #include "alidade/servo/identify/identify_flaws.h"
@@ -213,6 +214,7 @@ Solution without_resonance(std::span<const ServoSample> as_read, const std::vect
                            const Solution& plain, ServoKindRule rule) {
   const auto& [log, fits] = std::tie(plain.log, plain.fits);
   const Solution as_logged = with_faults_tried(with_flaws_tried(log, fits, rule), rule);
+  if (log.size() != as_read.size()) return as_logged;  // it has commands between its rows
   const std::array<std::optional<CommandTimes>, 2> times{command_times(log, fits[0]), command_times(log, fits[1])};
   std::array<ServoFit, 2> earlier = fits;
   for (std::size_t kind = 0; kind < 2; ++kind)
@@ -291,16 +293,30 @@ Solution with_resonance_tried(const Solution& as_logged, const Solution& believe
   return result;
 }
 
-Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s, ServoKindRule rule) {
-  const std::vector<ServoSample> log = sampled_log(as_read, sampled_t_s);
+/// From the rows that were read, and the same with the times at which an encoder was sampled.
+Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s,
+                const std::vector<ServoSample>& log, ServoKindRule rule) {
   const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
                                      refined(log, ServoKind::rate, searched(log, ServoKind::rate).params)};
   const Solution as_logged{log, fits, {}, believed_of(fits, rule), std::nullopt, {}, {}};
   return with_resonance_tried(as_logged, without_resonance(as_read, sampled_t_s, as_logged, rule), rule);
 }
 
-void count_command_times(std::span<const ServoSample> log, const std::optional<CommandTimes>& times,
-                         ServoIdentification& result) {
+/// As logged; or with commands between the rows, where they explain more than what the axis may do beside.
+Solution with_commands_between_tried(const std::vector<ServoSample>& log, Solution as_logged, ServoKindRule rule,
+                                     std::size_t& per_row) {
+  const ServoKind kind = as_logged.fit().kind;
+  per_row = commands_per_row(log, refined(log, kind, searched(log, kind).params));
+  if (per_row == 0) return as_logged;
+  Solution finer = solved(log, {}, with_commands_between(log, per_row), rule);
+  if (evidence_against(as_logged, finer) + price_of_faults(log, as_logged) - price_of_faults(log, finer) > 0.0)
+    return finer;
+  per_row = 0;
+  return as_logged;
+}
+
+void count_command_times(std::span<const ServoSample> log, const Solution& found, ServoIdentification& result) {
+  const std::optional<CommandTimes>& times = found.times;
   if (times) {
     result.command_t_s = times->given_t_s;
     result.num_command_times = times->num;
@@ -308,6 +324,12 @@ void count_command_times(std::span<const ServoSample> log, const std::optional<C
   }
   result.sigma_command_s = times ? times->sigma_offset_s : sigma_of_drifting_commands(log, result.fit);
   result.fit.cov(ServoParam::latency, ServoParam::latency) += result.sigma_command_s * result.sigma_command_s;
+  result.has_frequent_commands &= !(result.sigma_command_s > 0.0) && result.fit.is_observable;
+  if (!result.has_frequent_commands) return;
+  const auto added = cov_of_commands_between(without_faults(log, found.lost_commands, found.slips), result.fit,
+                                             result.commands_per_row);
+  result.fit.cov += added;
+  result.sigma_command_s = std::sqrt(added(ServoParam::latency, ServoParam::latency));
 }
 
 }  // namespace
@@ -325,7 +347,11 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
     result.encoder_hz = 1.0 / held->sampling.period_s;
     result.sampled_t_s = sampled_times(as_read, held->sampling);
   }
-  const Solution found = solved(as_read, result.sampled_t_s, rule);
+  const std::vector<ServoSample> rows = sampled_log(as_read, result.sampled_t_s);
+  Solution found = solved(as_read, result.sampled_t_s, rows, rule);
+  result.has_frequent_commands = !found.times && has_frequent_commands(as_read);
+  if (result.has_frequent_commands)
+    found = with_commands_between_tried(rows, std::move(found), rule, result.commands_per_row);
   const std::vector<ServoSample>& log = found.log;
   result.fit = found.fit();
   result.other = found.fits[1 - found.believed];
@@ -343,8 +369,10 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
   result.lag_one_correlation = lag_one_correlation(residuals);
   constexpr std::size_t several = 2;
   if (num_sizes(log, several) < several && result.fit.is_observable) result.hidden = hidden_flaws(log, result.fit);
-  if (held) count_by_row(log, held->sigma_phase_s, result);
-  count_command_times(as_read, found.times, result);
+  if (held) count_by_row(rows, held->sigma_phase_s, result);
+  count_command_times(rows, found, result);
+  for (ZeroSlip& slip : result.slips)
+    slip.row = static_cast<std::size_t>(std::ranges::lower_bound(rows, slip.t_s, {}, &ServoSample::t_s) - rows.begin());
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/time_unit.h"
+#include "alidade/servo/identify/frequent_commands.h"
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/identify_flaws.h"
@@ -30,6 +31,21 @@ std::string command_times_text(const ServoIdentification& identified) {
   return text +
          " commands were given before their rows, between two or where rows are lost: when is estimated, but for " +
          text_of(1e3 * identified.sigma_command_s, 2) + " ms (σ) of the latency";
+}
+
+/// Commands that change from row to row: how many there are between two, and what that leaves open of the latency.
+void add_frequent_commands(const ServoIdentification& identified, Verdict& verdict) {
+  const std::size_t num = identified.commands_per_row;
+  const double sigma_s = identified.sigma_command_s, most_s = max_sigma_command_s(identified.fit);
+  const bool is_small = sigma_s <= most_s;
+  std::string text = num == 0 ? std::string("commands change from row to row: taken as given at rows")
+                     : num == continuous_commands
+                         ? std::string("the response is that of commands which change between rows all the time")
+                         : "the response is that of " + std::to_string(num) + " commands from row to row";
+  if (num > 0) text += ": those between are interpolated";
+  text += ", which leaves " + text_of(1e3 * sigma_s, 2) + " ms (σ) of the latency open, counted in σ";
+  if (!is_small) text += ": a controller that gives more commands than rows are logged has a longer latency";
+  verdict.checks.push_back({"command times", is_small ? State::good : State::care, text, sigma_s, most_s, "s", ""});
 }
 
 /// Whether blocks of rows agree on what the servo does. What was before the log is seen in its first rows alone: one
@@ -101,7 +117,9 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
   if (identified.num_command_times > 0)
     verdict.checks.push_back({"command times", State::good, command_times_text(identified),
                               static_cast<double>(identified.num_command_times), 0.0, "commands", ""});
-  if (identified.num_command_times == 0 && identified.sigma_command_s > 0.0)
+  if (identified.has_frequent_commands)
+    add_frequent_commands(identified, verdict);
+  else if (identified.num_command_times == 0 && identified.sigma_command_s > 0.0)
     verdict.checks.push_back(
         {"command times", State::care,
          "the clocks' drift is within a row by the end of the log, as of commands at a regular spacing that are given "
@@ -267,7 +285,9 @@ Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& 
   add_readings(log, identified, verdict);
   add_faults(log, identified, verdict);
   add_checks(log, identified, verdict);
-  add_causes(without_faults(log, identified.lost_commands, identified.slips), identified, verdict);
+  add_causes(without_faults(with_commands_between(log, identified.commands_per_row), identified.lost_commands,
+                            identified.slips),
+             identified, verdict);
   add_excitation(log, identified, verdict);
   verdict.sentence = std::string(is_angle ? "the angle" : "the rate") + " follows the command by " +
                      text_of(fit.params[0]) + " rad" + (is_angle ? "" : "/s") + " per unit with a time constant of " +
@@ -278,6 +298,8 @@ Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& 
     if (verdict.state == State::good) verdict.sentence += "; " + check.text;
     if (verdict.to_add.empty() && check.name == "excitation")
       verdict.to_add = "log steps of several sizes to both sides, or a chirp";
+    if (verdict.to_add.empty() && check.name == "command times")
+      verdict.to_add = "log a row for each command, or when it was given (command_t_s)";
     verdict.state = State::care;
   }
   return verdict;

@@ -213,7 +213,7 @@ Eigen::MatrixXd with_slips(std::span<const ServoSample> log, const std::vector<Z
     J.rightCols<1>().setZero();
     Index reading = -1;
     for (std::size_t row = 0; row < log.size(); ++row)
-      if (is_reading(log, row) && (++reading, row >= slip.row)) J(reading, J.cols() - 1) = 1.0;
+      if (is_reading(log, row) && (++reading, log[row].t_s >= slip.t_s)) J(reading, J.cols() - 1) = 1.0;
   }
   return J;
 }
@@ -227,7 +227,8 @@ std::vector<ServoSample> without_faults(std::span<const ServoSample> log, const 
       rows[i].command = rows[row - 1].command;
   }
   for (const ZeroSlip& slip : slips)
-    for (std::size_t i = slip.row; i < rows.size(); ++i) rows[i].angle_rad -= slip.size_rad;
+    for (ServoSample& row : rows)
+      if (row.t_s >= slip.t_s) row.angle_rad -= slip.size_rad;
   return rows;
 }
 

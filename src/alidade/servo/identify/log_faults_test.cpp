@@ -16,14 +16,9 @@
 namespace alidade {
 namespace {
 
+using testing::error_in_sigma;
 using testing::late_scene;
 using testing::log_of;
-
-double error_in_sigma(const ServoFit& fit, const ServoLogScene& scene, int param) {
-  const ServoAxis& axis = scene.axis;
-  const std::array<double, 3> truth{gain_of(axis.plant), tau_of(axis.plant), axis.command_delay_s};
-  return (fit.params[param] - truth[static_cast<std::size_t>(param)]) / std::sqrt(fit.cov(param, param));
-}
 
 /// Steps of several sizes; where the axis is not to follow one, it goes by what it was last commanded.
 std::vector<ServoSample> log_with_lost(const ServoLogScene& scene, std::uint64_t seed,

@@ -26,6 +26,9 @@ inline constexpr double sigmas_of_time_stamps = 3.0;
 void count_time_stamps(std::span<const ServoSample> log, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse,
                        ServoIdentification& result);
 
+/// The median of the times from row to row.
+[[nodiscard]] double usual_spacing(std::span<const ServoSample> log);
+
 /// A log of commands that were given before their rows: between rows, or at one that was lost.
 struct CommandTimes {
   ServoFit fit;                       ///< Of the plain model, with them.

@@ -17,6 +17,7 @@
 namespace alidade {
 namespace {
 
+using testing::error_in_sigma;
 using testing::late_scene;
 using testing::log_of;
 
@@ -33,12 +34,6 @@ std::vector<ServoSample> with_clock(std::vector<ServoSample> log, double factor)
     row.t_s *= factor;
   }
   return log;
-}
-
-double error_in_sigma(const ServoFit& fit, const ServoLogScene& scene, int param) {
-  const ServoAxis& axis = scene.axis;
-  const std::array<double, 3> truth{gain_of(axis.plant), tau_of(axis.plant), axis.command_delay_s};
-  return (fit.params[param] - truth[static_cast<std::size_t>(param)]) / std::sqrt(fit.cov(param, param));
 }
 
 TEST(ServoLogTimes, AClockThatDriftsIsThatOfALogReadLater) {

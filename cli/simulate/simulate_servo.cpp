@@ -21,7 +21,7 @@ struct SimulateServoArgs {
   bool chirp = false, one_step = false;
   int commands_per_row = 1;
   double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = no_limit_deg_s, max_acceleration_deg_s2 = 1e9;
-  double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0;
+  double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0, max_command = 0.0, rate_offset_deg_s = 0.0;
   Mode resonance{.hz = 0.0, .damping = 0.05, .share = 1.0};
   double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
 };
@@ -43,6 +43,8 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
   scene.axis.backlash_rad = deg * args.backlash_deg;
   scene.axis.second_tau_s = args.second_tau_s;
   scene.mode = args.resonance;
+  scene.max_command = args.max_command;
+  scene.rate_offset_rad_s = deg * args.rate_offset_deg_s;
   scene.axis.command_delay_s = args.latency_s;
   scene.is_chirp = args.chirp;
   if (args.one_step) scene.steps = {1.0};
@@ -57,7 +59,8 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
 }
 
 ExitCode simulate_servo(const SimulateServoArgs& args, Run& run) {
-  if (args.duration_s * args.rate_hz * args.commands_per_row > 1e6) throw UsageError("--rate-hz: makes more than a million rows");
+  if (args.duration_s * args.rate_hz * args.commands_per_row > 1e6)
+    throw UsageError("--rate-hz: makes more than a million rows");
   const ServoLogScene scene = scene_of(args);
   std::vector<ServoSample> samples;
   for (const ServoLogRow& row : simulate_servo_log(scene, run.options.seed))
@@ -104,6 +107,10 @@ void add_servo_scenario(App& app) {
              "With --kind rate: largest acceleration [deg/s2]", 1e-3, 1e9);
   add_number(command, "--dead-band", args->dead_band,
              "Commands no larger do nothing, larger ones count from it [units of command]", 0.0, 1e9);
+  add_number(command, "--max-command", args->max_command, "Larger commands act as it [units of command]; 0: none do",
+             0.0, 1e9);
+  add_number(command, "--rate-offset-deg-s", args->rate_offset_deg_s,
+             "It turns by so much beside what it is commanded, as of a neutral that is off [deg/s]", -90.0, 90.0);
   add_number(command, "--backlash-deg", args->backlash_deg,
              "Play between what drives the axis and the angle that is read", 0.0, 90.0);
   add_number(command, "--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);

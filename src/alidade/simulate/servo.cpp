@@ -211,8 +211,8 @@ std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uin
     row.t_s = k / rate_hz;
     row.command = command_of(scene, row.t_s);
     if (k % per_row == 0) {
-      row.angle_rad =
-          rounded_to(scene.zero_rad + axis.angle_rad() + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
+      const double turned_rad = scene.zero_rad + axis.angle_rad() + scene.rate_offset_rad_s * row.t_s;
+      row.angle_rad = rounded_to(turned_rad + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
       rows.push_back(row);
     }
     waiting.push_back(row);
@@ -221,7 +221,8 @@ std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uin
     for (; !waiting.empty() && waiting.front().t_s + scene.axis.command_delay_s <= next_s; waiting.pop_front()) {
       const double acts_s = std::max(now_s, waiting.front().t_s + scene.axis.command_delay_s);
       axis.advance(acts_s - now_s);
-      axis.send(waiting.front().command);
+      const double command = waiting.front().command;
+      axis.send(scene.max_command > 0.0 ? std::clamp(command, -scene.max_command, scene.max_command) : command);
       now_s = acts_s;
     }
     axis.advance(next_s - now_s);

@@ -60,10 +60,13 @@ struct ServoLogScene {
   bool is_chirp = false;
   double amplitude = 200.0;  ///< Of the command.
   double duration_s = 5.0, rate_hz = 100.0;
-  int commands_per_row = 1;  ///< Commands change so often from row to row; a row has the one that is valid from then on.
+  int commands_per_row =
+      1;  ///< Commands change so often from row to row; a row has the one that is valid from then on.
   double step_at_s = 0.5, hold_s = 0.9;                   ///< The first step, and each until the next.
   std::vector<double> steps{1.0, -0.5, 0.25, -1.0, 0.5};  ///< Of the amplitude, over and over; one: it stays.
   double low_hz = 0.1, high_hz = 3.0;                     ///< Of the chirp.
+  double max_command = 0.0;                               ///< Larger ones act as it; 0: none do.
+  double rate_offset_rad_s = 0.0;                         ///< It turns by so much beside what it is commanded.
   double zero_rad = 0.0;                                  ///< What the encoder reads at angle zero.
   double sigma_rad = 0.0008726646259971648, encoder_step_rad = 0.0;
 };

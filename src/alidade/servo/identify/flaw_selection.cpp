@@ -20,7 +20,7 @@ constexpr int first_steps = 8, max_steps = 40;
 /// Begins the fit with one more flaw, from the two sizes that explain most; of a limit of rate also from one that
 /// hardly limits: a step beyond what is reached changes nothing, and does not come back.
 Candidate begun(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
-  const bool is_linear = is_of_the_gain(flaw);
+  const bool is_linear = is_of_the_gain(flaw) || flaw == ServoFlaw::rate_offset;
   const std::size_t max_starts = is_linear ? 1 : 2;
   const std::vector<FlawScore> scores = flaw_scores(log, fit, ground, flaw);
   Candidate best{flaw, fit};
@@ -133,6 +133,13 @@ double lag_one_correlation(const Eigen::VectorXd& misfit) {
   return misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300);
 }
 
+double effective_rows(const Eigen::VectorXd& misfit) {
+  const Index n = misfit.size();
+  const double colour =
+      std::clamp(misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300), 0.0, 0.95);
+  return static_cast<double>(n) * (1.0 - colour) / (1.0 + colour);
+}
+
 std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr double max_correlation = 0.3, min_sigmas = 3.5;
   const FlawGround ground = flaw_ground(log, fit);
@@ -156,7 +163,8 @@ ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& start, std
     const double sum2 = ground.misfit.squaredNorm();
     std::vector<Candidate> candidates;
     for (const std::size_t flaw : flaws)
-      if (std::ranges::count(fit.freed, flaw) == 0) candidates.push_back(begun(log, fit, ground, flaw));
+      if (std::ranges::count(fit.freed, flaw) == 0 && is_of_kind(fit.kind, flaw))
+        candidates.push_back(begun(log, fit, ground, flaw));
     if (candidates.empty()) break;
     finish(log, candidates);
     const Candidate& best = candidates.front();

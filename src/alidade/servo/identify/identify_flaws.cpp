@@ -18,6 +18,7 @@ using Eigen::Index;
 
 constexpr double no_limit = 1e9;
 constexpr double gain_unit = 0.05, max_gain_change = 0.9;  ///< Of a step of one, and at most.
+constexpr double offset_unit_rad_s = 0.01;
 constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one; beyond it nobody calls it a clock.
 constexpr double min_damping = 5e-3, max_damping = 0.9;    ///< Of what swings.
 
@@ -62,6 +63,7 @@ class FlawedServo {
   void advance(double dt_s, double command, double share) {
     if (!(dt_s > 0.0)) return;
     const double goal = goal_of(command, share), lag_s = flaws_.second_tau_s;
+    turned_ += flaws_.rate_offset_rad_s * dt_s;
     if (!(lag_s > 0.0)) {
       move(dt_s, goal);
       return;
@@ -86,6 +88,7 @@ class FlawedServo {
  private:
   /// The command that an axis of the stated gain would have to follow.
   [[nodiscard]] double goal_of(double command, double share) const {
+    if (flaws_.max_command > 0.0) command = std::clamp(command, -flaws_.max_command, flaws_.max_command);
     const double difference = command > 0.0 ? flaws_.gain_difference : -flaws_.gain_difference;
     double goal =
         past_dead_band(command, flaws_.dead_band) * (1.0 + difference) * (1.0 + flaws_.gain_drift * (share - 0.5));
@@ -152,6 +155,7 @@ class FlawedServo {
     const double half = 0.5 * flaws_.backlash_rad;
     double angle = now_.angle_rad;
     if (swinging_) angle += flaws_.resonance_share * (swinging_->angle_rad() - angle);
+    angle += turned_;
     read_ = std::clamp(read_, angle - half, angle + half);
   }
 
@@ -163,7 +167,7 @@ class FlawedServo {
   ServoAxis axis_;
   AxisMotion now_;
   std::optional<Resonance> swinging_;
-  double lagged_, read_ = 0.0;
+  double lagged_, read_ = 0.0, turned_ = 0.0;
 };
 
 /// What a step of one is in a flaw's size: those that have one sign go by factors.
@@ -172,8 +176,13 @@ double unit_of(const ServoFit& fit, std::size_t flaw) {
   if (flaw == ServoFlaw::clock_rate) return clock_unit;
   if (is_of_the_gain(flaw)) return gain_unit;
   if (flaw == ServoFlaw::resonance_share) return 1.0;
+  if (flaw == ServoFlaw::rate_offset) return offset_unit_rad_s;
   if (flaw == ServoFlaw::earlier_command) return turn_rad / std::max(std::abs(fit.params[ServoParam::gain]), 1e-300);
   return fit.flaws.*servo_flaws[flaw];
+}
+
+bool is_linear(std::size_t flaw) {
+  return flaw == ServoFlaw::earlier_command || flaw == ServoFlaw::resonance_share || flaw == ServoFlaw::rate_offset;
 }
 
 /// What a step of one parameter or freed flaw makes of a fit.
@@ -185,7 +194,7 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
   } else {
     const std::size_t flaw = fit.freed[static_cast<std::size_t>(param - num_servo_params)];
     double& size = next.flaws.*servo_flaws[flaw];
-    if (flaw == ServoFlaw::earlier_command || flaw == ServoFlaw::resonance_share) {  // the response is linear in it
+    if (is_linear(flaw)) {  // the response is linear in it
       size += by * unit_of(fit, flaw);
       return next;
     }
@@ -275,6 +284,10 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
     case ServoFlaw::gain_drift:
     case ServoFlaw::gain_by_size:  // the response is nearly linear in them
       return times(gain_unit, {-1.0, 1.0});
+    case ServoFlaw::command_limit:
+      return times(max_command(log), {0.98, 0.9, 0.8, 0.65, 0.5, 0.3});
+    case ServoFlaw::rate_offset:
+      return times(offset_unit_rad_s, {-1.0, 1.0});
     default:
       return times(fit.params[ServoParam::tau], {0.1, 0.3, 0.6, 1.0});
   }
@@ -328,13 +341,6 @@ double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& 
   return descent.sum2;
 }
 
-double effective_rows(const Eigen::VectorXd& misfit) {
-  const Index n = misfit.size();
-  const double colour =
-      std::clamp(misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300), 0.0, 0.95);
-  return static_cast<double>(n) * (1.0 - colour) / (1.0 + colour);
-}
-
 Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit) {
   Eigen::MatrixXd J = jacobian_by_factors(log, fit);
   for (std::size_t i = 0; i < fit.freed.size(); ++i)
@@ -352,6 +358,7 @@ FlawGround flaw_ground(std::span<const ServoSample> log, const ServoFit& fit) {
 std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground,
                                    std::size_t flaw) {
   std::vector<FlawScore> scores;
+  if (!is_of_kind(fit.kind, flaw)) return {{}};
   for (const double size : sizes_of(log, fit, ground.response, flaw)) {
     ServoFlaws flaws = fit.flaws;
     flaws.*servo_flaws[flaw] = size;

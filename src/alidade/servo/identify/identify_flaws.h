@@ -22,6 +22,8 @@ struct ServoFlaw {
     gain_difference,
     gain_drift,
     gain_by_size,
+    command_limit,
+    rate_offset,
     resonance,  ///< Its frequency; the next two go with it.
     resonance_damping,
     resonance_share
@@ -56,6 +58,12 @@ inline constexpr std::size_t num_of_a_resonance = 3;
 /// Of the gain, in parts of it: the response is nearly linear in them.
 [[nodiscard]] constexpr bool is_of_the_gain(std::size_t flaw) {
   return flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift || flaw == ServoFlaw::gain_by_size;
+}
+
+/// Whether a plant of this kind can have it by itself: of the other one it is another flaw, or nothing.
+[[nodiscard]] constexpr bool is_of_kind(ServoKind kind, std::size_t flaw) {
+  if (flaw == ServoFlaw::command_limit) return kind == ServoKind::angle;
+  return flaw != ServoFlaw::rate_offset || kind == ServoKind::rate;
 }
 
 /// The log's, not the axis'.

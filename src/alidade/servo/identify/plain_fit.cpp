@@ -10,28 +10,40 @@
 namespace alidade {
 namespace {
 
-/// The response to commands of one sign: by it a gain that differs by the sign changes the response.
-Eigen::VectorXd rectified_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
-  std::vector<ServoSample> rows(log.begin(), log.end());
-  for (ServoSample& row : rows) row.command = std::abs(row.command);
-  return servo_response(rows, kind, params).J.col(ServoParam::gain);
-}
-
-LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s,
-                     const Eigen::VectorXd& readings, bool by_sign) {
+ServoParams unit_params(double tau_s, double latency_s) {
   ServoParams params;
   params << 1.0, tau_s, latency_s, 0.0, 0.0;
-  const ServoResponse response = servo_response(log, kind, params);
-  Eigen::MatrixXd A(readings.size(), by_sign ? 4 : 3);  // the response is linear in these
-  A.leftCols<3>() << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero),
-      response.J.col(ServoParam::start);
-  if (by_sign) A.col(3) = rectified_response(log, kind, params);
+  return params;
+}
+
+/// The response to commands of one sign: by it a gain that differs by the sign changes the response.
+Eigen::VectorXd rectified_response(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s) {
+  std::vector<ServoSample> rows(log.begin(), log.end());
+  for (ServoSample& row : rows) row.command = std::abs(row.command);
+  return servo_response(rows, kind, unit_params(tau_s, latency_s)).J.col(ServoParam::gain);
+}
+
+LinearFit fit_of(const Eigen::MatrixXd& A, const Eigen::VectorXd& readings, double tau_s, double latency_s) {
   const Eigen::VectorXd best = least_squares(A, readings);
   LinearFit fit;
   fit.params << best[0], tau_s, latency_s, best[1], best[2];
-  if (by_sign && best[0] != 0.0) fit.difference = best[3] / best[0];
+  if (A.cols() > 3 && best[0] != 0.0) fit.difference = best[3] / best[0];
   fit.sum2 = (A * best - readings).squaredNorm();
   return fit;
+}
+
+/// By which the response to gain, zero and start is linear.
+Eigen::MatrixXd linear_part(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s) {
+  const ServoResponse response = servo_response(log, kind, unit_params(tau_s, latency_s));
+  Eigen::MatrixXd A(response.J.rows(), 3);
+  A << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero), response.J.col(ServoParam::start);
+  return A;
+}
+
+Eigen::MatrixXd with_column(Eigen::MatrixXd A, const Eigen::VectorXd& column) {
+  A.conservativeResize(Eigen::NoChange, A.cols() + 1);
+  A.rightCols<1>() = column;
+  return A;
 }
 
 }  // namespace
@@ -46,19 +58,30 @@ std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
 }
 
 LinearFit searched(std::span<const ServoSample> log, ServoKind kind, bool by_sign) {
+  constexpr double clearly = 0.1;
   const std::vector<ServoSample> rows = thinned(log);
   const Eigen::VectorXd readings = readings_of(rows);
+  const std::vector<double> times_s = reading_times(rows);
+  const Eigen::VectorXd at_s = Eigen::Map<const Eigen::VectorXd>(times_s.data(), readings.size());
   const double duration_s = log.back().t_s - log.front().t_s;
   const double step_s = duration_s / static_cast<double>(log.size() - 1);
   std::vector<double> latencies{0.0};
   for (double late_s = 0.5 * step_s; late_s < duration_s / 3.0; late_s *= 1.4) latencies.push_back(late_s);
-  LinearFit best;
+  LinearFit best, turning;
+  const auto keep_better = [](LinearFit& kept, const LinearFit& tried) {
+    if (tried.sum2 < kept.sum2) kept = tried;
+  };
   for (double tau_s = 0.3 * step_s; tau_s < 3.0 * duration_s; tau_s *= 1.6) {
     for (const double latency_s : latencies) {
-      const LinearFit fit = linear_fit(rows, kind, tau_s, latency_s, readings, by_sign);
-      if (fit.sum2 < best.sum2) best = fit;
+      Eigen::MatrixXd A = linear_part(rows, kind, tau_s, latency_s);
+      if (by_sign) A = with_column(std::move(A), rectified_response(rows, kind, tau_s, latency_s));
+      keep_better(best, fit_of(A, readings, tau_s, latency_s));
+      if (kind != ServoKind::rate || by_sign) continue;
+      keep_better(turning, fit_of(with_column(std::move(A), at_s), readings, tau_s, latency_s));
     }
   }
+  // What a rate plant turns by beside its command may hide all else that it does.
+  if (turning.sum2 < clearly * best.sum2) return turning;
   return best;
 }
 

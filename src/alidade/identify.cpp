@@ -10,6 +10,7 @@
 #include "alidade/servo/identify/identify.h"
 #include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/log_times.h"
+#include "alidade/servo/identify/sampled_log.h"
 
 namespace alidade {
 namespace {
@@ -59,6 +60,22 @@ void identify_turns(Identification& result) {
   static_cast<ServoIdentification&>(result) = turned;
   result.log = rows;
   result.encoder_wraps = wraps;
+}
+
+/// Rows that are left out: a few do no harm.
+void add_spikes(const std::vector<ServoSample>& log, const std::vector<std::size_t>& rows, Identification& result) {
+  constexpr double few = 0.02;
+  if (rows.empty()) return;
+  const auto num = static_cast<double>(rows.size()), most = few * static_cast<double>(log.size());
+  const ServoSample& first = log[rows.front()];
+  result.verdict.checks.push_back({"outliers", num > most ? State::care : State::good,
+                                   std::to_string(rows.size()) + " of " + std::to_string(log.size()) +
+                                       " angles are far from those before and after them (first at t = " +
+                                       text_of(first.t_s, 4) + " s), where no axis is: left out",
+                                   num, most, "rows", ""});
+  if (num <= most || result.verdict.state != State::good) return;
+  result.verdict.state = State::care;
+  result.verdict.sentence += "; " + result.verdict.checks.back().text;
 }
 
 /// The rate of the log's clock, and what of the plant it moves most.
@@ -145,7 +162,8 @@ Identification identify(std::vector<ServoSample> log, const IdentifyConfig& conf
   require_sense(log);
   constexpr std::size_t min_rows = 20;
   Identification result;
-  result.log = std::move(log);
+  const std::vector<std::size_t> left_out = spikes(log);
+  result.log = without_rows(log, left_out);
   result.config = config;
   if (result.log.size() >= min_rows) identify_turns(result);
   if (result.fit.is_observable) count_clock_rate(config.sigma_clock, result.fit);
@@ -155,7 +173,9 @@ Identification identify(std::vector<ServoSample> log, const IdentifyConfig& conf
         {"wraps", State::good,
          "the encoder begins again after a turn, " + std::to_string(result.encoder_wraps) + " times: unwrapped",
          static_cast<double>(result.encoder_wraps), 0.0, "wraps", ""});
-  result.counts.given = result.counts.used = result.log.size();
+  add_spikes(log, left_out, result);
+  result.counts.given = log.size();
+  result.counts.used = result.log.size();
   if (result.residual_rad.empty()) return result;
   result.encoder_step_rad = encoder_step_rad(result.log);
   result.assumed = assumed_of(result, config.sigma_clock);

@@ -39,6 +39,7 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
     const auto at = num_servo_params + static_cast<Eigen::Index>(fit.freed.size() + i);
     result.slips[i].sigma_rad = std::sqrt(cov(at, at));
   }
+  count_short_lag(log, fit);
   count_ordinary_flaws(log, J, *inverse, result);
   count_time_stamps(log, J, *inverse, result);
 }
@@ -363,7 +364,8 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
   const Eigen::VectorXd residuals =
       (is_plain ? response.angle_rad : flawed_response(log, result.fit, result.fit.flaws)) - readings_of(log);
   result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
-  const Eigen::MatrixXd J = is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit);
+  const Eigen::MatrixXd J =
+      is_plain ? Eigen::MatrixXd(response.J) : with_open_lag(log, result.fit, flawed_jacobian(log, result.fit));
   set_clusters(log, with_slips(log, found.slips, J), result);
   result.status = status_of(result.fit);
   result.lag_one_correlation = lag_one_correlation(residuals);

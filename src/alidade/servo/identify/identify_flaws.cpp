@@ -20,7 +20,7 @@ constexpr double no_limit = 1e9;
 constexpr double gain_unit = 0.05, max_gain_change = 0.9;  ///< Of a step of one, and at most.
 constexpr double offset_unit_rad_s = 0.01;
 constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one; beyond it nobody calls it a clock.
-constexpr double min_damping = 5e-3, max_damping = 0.9;    ///< Of what swings.
+constexpr double min_damping = 5e-3, max_damping = 0.98;   ///< Of what swings.
 
 double max_command(std::span<const ServoSample> log) {
   double most = 0.0;

@@ -79,6 +79,17 @@ inline constexpr std::size_t num_of_a_resonance = 3;
 /// ∂ response / ∂ (parameters in their order, flaws that were freed), by differences.
 [[nodiscard]] Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit);
 
+/// The Jacobian where the response hardly depends, to the first order, on a time constant far below the rows' spacing,
+/// beside a resonance or a limit of acceleration, or on how two equal lags are split: with the column of the time
+/// constant a difference so wide that it shows.
+[[nodiscard]] Eigen::MatrixXd with_open_lag(std::span<const ServoSample> log, const ServoFit& fit, Eigen::MatrixXd J);
+
+/// Includes in the covariance that such a time constant below the rows' spacing may as well be a latency.
+void count_short_lag(std::span<const ServoSample> log, ServoFit& fit);
+
+/// Whether the lag is of an acceleration or of what swings, so that the axis needs no other.
+[[nodiscard]] bool is_lagged_otherwise(const ServoFit& fit);
+
 /// Response − readings.
 [[nodiscard]] Eigen::VectorXd flawed_misfit(std::span<const ServoSample> log, const ServoFit& fit);
 

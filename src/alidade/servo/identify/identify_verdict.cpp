@@ -103,10 +103,11 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
        correlation, limit, "1", ""});
   verdict.checks.push_back(blocks_agree(identified));
   const double step_s = identified.duration_s / (rows - 1.0);
-  const bool is_resolved = fit.params[1] > 0.5 * step_s;
+  const bool is_long = fit.params[1] > 0.5 * step_s, is_resolved = is_long || is_lagged_otherwise(fit);
   verdict.checks.push_back({"sampling", is_resolved ? State::good : State::care,
-                            is_resolved ? "rows are close enough for the time constant"
-                                        : "rows are further apart than twice the time constant: log faster",
+                            is_long       ? "rows are close enough for the time constant"
+                            : is_resolved ? "the axis has no time constant beside its acceleration or what swings"
+                                          : "rows are further apart than twice the time constant: log faster",
                             fit.params[1] / step_s, 0.5, "rows", ""});
   if (identified.encoder_hz > 0.0)
     verdict.checks.push_back({"encoder", State::good,
@@ -267,7 +268,10 @@ std::optional<Verdict> refusal(std::span<const ServoSample> log, const ServoIden
     return refused("no answer: the gain " + text_of(fit.params[0]) + " is not distinguishable from zero (σ " +
                        text_of(sigma[0]) + ")",
                    excite);
-  if (!(sigma[1] < 0.5 * fit.params[1]) && !(fit.params[1] + 2.0 * sigma[1] < 0.02 * identified.duration_s))
+  // Of two lags their sum may be determined, and how it is split not; an axis that lags otherwise may have none.
+  const bool is_split = std::ranges::count(fit.freed, std::size_t{ServoFlaw::second_lag}) > 0;
+  const double open = is_split ? 2.0 : 0.5, of_log = is_lagged_otherwise(fit) ? 0.1 : 0.02;
+  if (!(sigma[1] < open * fit.params[1]) && !(fit.params[1] + 2.0 * sigma[1] < of_log * identified.duration_s))
     return refused("too short or too coarse: the time constant is " + text_of(fit.params[1]) + " s with σ " +
                        text_of(sigma[1]) + " s",
                    "log for several time constants after a change of command, and faster");

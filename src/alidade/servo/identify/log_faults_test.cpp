@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/identify.h"
 #include "alidade/servo/identify/identify_flaws.h"
 #include "alidade/servo/identify/sampled_log.h"
 #include "alidade/testing/servo_sample.h"
@@ -113,6 +114,25 @@ TEST(LogFaults, CleanLogsHaveNone) {
       EXPECT_TRUE(lost_commands(clean, is_rate_plant ? ServoKind::rate : ServoKind::angle).empty()) << seed;
       const ServoIdentification identified = identify_servo(clean);
       EXPECT_TRUE(identified.slips.empty() && identified.lost_commands.empty()) << is_rate_plant << seed;
+    }
+  }
+}
+
+/// One angle of 3 rad in the first rows was the end of a log: "the gain is not distinguishable from zero".
+TEST(LogFaults, SpikesAreLeftOut) {
+  for (const bool is_rate_plant : {false, true}) {
+    const ServoLogScene scene = late_scene(is_rate_plant);
+    const std::vector<ServoSample> clean = log_of(scene, 1);
+    EXPECT_TRUE(spikes(clean).empty());
+    for (const auto& rows : std::vector<std::vector<std::size_t>>{{2}, {0}, {70, 71, 300}}) {
+      std::vector<ServoSample> log = clean;
+      for (const std::size_t row : rows) log[row].angle_rad += 3.0;
+      EXPECT_EQ(spikes(log), rows);
+      const Identification found = identify(log);
+      EXPECT_EQ(found.verdict.state, State::good) << found.verdict.sentence;
+      EXPECT_EQ(found.counts.given, found.counts.used + rows.size());
+      for (int param = 0; param < 3; ++param)
+        EXPECT_LT(std::abs(error_in_sigma(found.fit, scene, param)), 4.0) << is_rate_plant << rows.front();
     }
   }
 }

@@ -116,7 +116,7 @@ std::vector<ResonantFit> starts_at(std::span<const ServoSample> log, const Servo
                      {ServoFlaw::resonance, ServoFlaw::resonance_damping, ServoFlaw::resonance_share});
   std::vector<ResonantFit> grid, starts;
   for (const double hz : frequencies(log, ratio))
-    for (const double damping : {0.05, 0.25}) {
+    for (const double damping : {0.05, 0.25, 0.7}) {
       const auto own = added_across(times_s, ground, base.rms_rad, hz, damping);
       if (!own) continue;
       const double share = std::clamp(-own->dot(ground.misfit) / own->squaredNorm(), -most_share, most_share);
@@ -135,12 +135,14 @@ std::vector<ResonantFit> starts_at(std::span<const ServoSample> log, const Servo
   return starts;
 }
 
-/// Of what swings: a lightly damped one, within what readings resolve.
+/// Of what swings: a lightly damped one, within what readings resolve; or an axis of the second order, all of it.
 bool has_meaning(std::span<const ServoSample> log, const ServoFlaws& flaws) {
   constexpr double most_damping = 0.6, beyond = 1.2;  // from 0.7 on nothing is resonant
+  constexpr double off_whole = 0.1, most_of_an_axis = 0.97;
+  const bool is_whole = std::abs(flaws.resonance_share - 1.0) < off_whole && flaws.resonance_damping < most_of_an_axis;
   const std::vector<double> known = frequencies(log, beyond);
-  return !known.empty() && flaws.resonance_damping < most_damping && flaws.resonance_hz > known.front() / beyond &&
-         flaws.resonance_hz < known.back() * beyond * beyond;
+  return !known.empty() && (flaws.resonance_damping < most_damping || is_whole) &&
+         flaws.resonance_hz > known.front() / beyond && flaws.resonance_hz < known.back() * beyond * beyond;
 }
 
 /// Leaves out those on their way to where a better one is, and those whose 2 ln of the likelihood is `far` below the

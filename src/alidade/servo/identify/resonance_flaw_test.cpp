@@ -107,5 +107,40 @@ TEST(ServoResonance, LostRowsAreNone) {
   EXPECT_LT(resonance_score(log, identified.fit, flaw_ground(log, identified.fit)).sigmas, sigmas_of_a_resonance);
 }
 
+/// An axis of the second order, a trapezoidal positioner: without a time constant. They were refused as too short or
+/// too coarse a log, or told to log faster.
+TEST(ServoResonance, AnAxisWithoutATimeConstantIsAnAnswer) {
+  for (const double damping : {0.5, 0.9}) {
+    ServoLogScene scene = late_scene(false);
+    scene.axis.plant = AnglePlant{0.001, AngleUnit::rad, 1e-3};
+    scene.mode = {.hz = 3.183, .damping = damping, .share = 1.0};
+    scene.duration_s = 15.0;
+    const std::vector<ServoSample> log = log_of(scene, 1);
+    const ServoIdentification found = identify_servo(log);
+    const Verdict verdict = identify_verdict(log, found);
+    EXPECT_EQ(verdict.exit_code, ExitCode::ok) << verdict.sentence;
+    EXPECT_EQ(verdict.sentence.find("log faster"), std::string::npos) << verdict.sentence;
+    ASSERT_EQ(std::ranges::count(found.fit.freed, std::size_t{ServoFlaw::resonance}), 1) << verdict.sentence;
+    EXPECT_NEAR(found.fit.flaws.resonance_hz, 3.183, 4.0 * found.fit.flaw_sigma[ServoFlaw::resonance]);
+    EXPECT_LT(std::abs(testing::error_in_sigma(found.fit, scene, ServoParam::gain)), 4.0);
+  }
+}
+
+TEST(ServoResonance, ATrapezoidalPositionerIsAnAnswer) {
+  ServoLogScene scene = late_scene(false);
+  AnglePlant plant{0.001, AngleUnit::rad, 1e-3};
+  plant.max_rate_rad_s = 0.6;
+  plant.max_acceleration_rad_s2 = 3.0;
+  scene.axis.plant = plant;
+  scene.duration_s = 15.0;
+  const std::vector<ServoSample> log = log_of(scene, 1);
+  const ServoIdentification found = identify_servo(log);
+  const Verdict verdict = identify_verdict(log, found);
+  EXPECT_EQ(verdict.exit_code, ExitCode::ok) << verdict.sentence;
+  EXPECT_NEAR(found.fit.flaws.max_rate_rad_s, 0.6, 4.0 * found.fit.flaw_sigma[ServoFlaw::rate_limit]);
+  EXPECT_NEAR(found.fit.flaws.max_acceleration_rad_s2, 3.0, 4.0 * found.fit.flaw_sigma[ServoFlaw::acceleration_limit]);
+  for (int param = 0; param < 3; ++param) EXPECT_LT(std::abs(testing::error_in_sigma(found.fit, scene, param)), 4.0);
+}
+
 }  // namespace
 }  // namespace alidade

@@ -34,6 +34,14 @@ struct HeldSampling {
                                                    const std::vector<double>& sampled_t_s,
                                                    const std::vector<double>& command_t_s = {});
 
+/// Rows whose angle is far from those before and after them, at most three in a row: no axis is there and back so soon.
+/// Far: of ten times what the rows about them differ by. Not by a turn: an encoder may begin again.
+[[nodiscard]] std::vector<std::size_t> spikes(std::span<const ServoSample> log);
+
+/// The log without some of its rows; of a command that changed in one of them the next row has the time.
+[[nodiscard]] std::vector<ServoSample> without_rows(std::span<const ServoSample> log,
+                                                    const std::vector<std::size_t>& rows);
+
 /// Rows whose command, of those that changed, the axis did not follow: what every command did is fitted by itself, with
 /// time constant and latency by their grid, then those are lost without which one gain explains the log. None where
 /// commands change fewer than four times or more than sixty, or a third seems lost.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -162,6 +163,8 @@ Identification identify(std::vector<ServoSample> log, const IdentifyConfig& conf
   require_sense(log);
   constexpr std::size_t min_rows = 20;
   Identification result;
+  const std::optional<RegularTimes> rounded = regular_times(log);
+  for (std::size_t i = 0; rounded && i < log.size(); ++i) log[i].t_s = rounded->t_s[i];
   const std::vector<std::size_t> left_out = spikes(log);
   result.log = without_rows(log, left_out);
   result.config = config;
@@ -174,6 +177,12 @@ Identification identify(std::vector<ServoSample> log, const IdentifyConfig& conf
          "the encoder begins again after a turn, " + std::to_string(result.encoder_wraps) + " times: unwrapped",
          static_cast<double>(result.encoder_wraps), 0.0, "wraps", ""});
   add_spikes(log, left_out, result);
+  if (rounded)
+    result.verdict.checks.push_back({"times", State::good,
+                                     "times are rounded to " + text_of(1e3 * rounded->step_s) +
+                                         " ms: rows are taken as regular, " + text_of(1e3 * rounded->spacing_s) +
+                                         " ms apart",
+                                     rounded->step_s, 0.0, "s", ""});
   result.counts.given = log.size();
   result.counts.used = result.log.size();
   if (result.residual_rad.empty()) return result;

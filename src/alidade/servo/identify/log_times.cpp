@@ -43,6 +43,33 @@ Eigen::VectorXd slope_of(std::span<const ServoSample> log, const Eigen::VectorXd
 
 }  // namespace
 
+std::optional<RegularTimes> regular_times(std::span<const ServoSample> log) {
+  constexpr double as_written_s = 2e-6, most_off = 1.05,
+                   least_of_spacing = 0.02;  // off: of a step, in all
+  constexpr std::size_t least_rows = 20;
+  if (log.size() < least_rows) return std::nullopt;
+  const double begin_s = log.front().t_s, spacing_s = usual_spacing(log);
+  for (const double step_s : {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3}) {
+    if (step_s > 2.0 * spacing_s || step_s < least_of_spacing * spacing_s) continue;
+    const bool is_rounded = std::ranges::all_of(log, [&](const ServoSample& row) {
+      return std::abs(std::remainder(row.t_s - begin_s, step_s)) < as_written_s && std::isnan(row.command_t_s);
+    });
+    if (!is_rounded) continue;
+    const auto num = static_cast<Index>(log.size());
+    Eigen::VectorXd t_s(num);
+    for (Index i = 0; i < num; ++i) t_s[i] = log[static_cast<std::size_t>(i)].t_s;
+    const Eigen::VectorXd at =
+        Eigen::VectorXd::LinSpaced(num, -0.5 * static_cast<double>(num - 1), 0.5 * static_cast<double>(num - 1));
+    const double apart_s = at.dot(t_s) / at.squaredNorm();
+    const Eigen::VectorXd line = (apart_s * at).array() + t_s.mean();
+    const Eigen::VectorXd off_s = t_s - line;
+    const double range_s = off_s.maxCoeff() - off_s.minCoeff();
+    if (range_s < 0.2 * step_s || range_s > most_off * step_s) return std::nullopt;
+    return RegularTimes{step_s, apart_s, {line.data(), line.data() + num}};
+  }
+  return std::nullopt;
+}
+
 ServoParams by_clock_rate(const ServoFit& fit) {
   ServoParams by = ServoParams::Zero();
   by[ServoParam::tau] = fit.params[ServoParam::tau];

@@ -26,6 +26,14 @@ inline constexpr double sigmas_of_time_stamps = 3.0;
 void count_time_stamps(std::span<const ServoSample> log, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse,
                        ServoIdentification& result);
 
+/// The times of rows that came at a regular spacing and were rounded to whole multiples of a step.
+struct RegularTimes {
+  double step_s = 0.0, spacing_s = 0.0;
+  std::vector<double> t_s;  ///< As they were: from the line through them none is further than a rounding.
+};
+/// None: times are no such multiples, regular as they are, or not regular.
+[[nodiscard]] std::optional<RegularTimes> regular_times(std::span<const ServoSample> log);
+
 /// The median of the times from row to row.
 [[nodiscard]] double usual_spacing(std::span<const ServoSample> log);
 

@@ -246,5 +246,23 @@ TEST(ServoLogTimes, AnEncoderThatBeginsAgainIsUnwrapped) {
   }
 }
 
+/// Regular rows, rounded to 10 ms: a resonance of 14 Hz, and a time constant 9σ off.
+TEST(ServoLogTimes, RegularTimesAreThoseOfRegularRows) {
+  for (const bool is_rate_plant : {false, true}) {
+    ServoLogScene scene = late_scene(is_rate_plant);
+    scene.rate_hz = 80.0;
+    scene.duration_s = 10.0;
+    scene.hold_s = 0.9125;
+    std::vector<ServoSample> log = log_of(scene, 1);
+    EXPECT_FALSE(regular_times(log));
+    for (ServoSample& row : log) row.t_s = 0.01 * std::round(100.0 * row.t_s);
+    const Identification found = identify(log);
+    EXPECT_EQ(found.verdict.state, State::good) << found.verdict.sentence;
+    EXPECT_TRUE(found.fit.freed.empty()) << found.verdict.sentence;
+    EXPECT_EQ(std::ranges::count(found.verdict.checks, "times", &Check::name), 1);
+    for (int param = 0; param < 3; ++param) EXPECT_LT(std::abs(error_in_sigma(found.fit, scene, param)), 4.0);
+  }
+}
+
 }  // namespace
 }  // namespace alidade

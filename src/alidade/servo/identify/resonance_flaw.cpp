@@ -58,7 +58,9 @@ double at_lag(const Eigen::VectorXd& values, Index lag) {
   return values.head(values.size() - lag).dot(values.tail(values.size() - lag));
 }
 
-/// Of Σ own · error, if errors are as correlated as `left` is, and no less than white ones are.
+/// Of Σ own · error, if errors are as correlated as `left` is, and no less than white ones are, nor than those are that
+/// grow where the axis moves, as of times that err (H. White, "A heteroskedasticity-consistent covariance matrix
+/// estimator", 1980).
 double score_variance(const Eigen::VectorXd& own, const Eigen::VectorXd& left, double dof) {
   constexpr std::size_t least_lags = 4, parts = 8;
   const std::vector<double> errors(left.data(), left.data() + left.size());
@@ -70,7 +72,7 @@ double score_variance(const Eigen::VectorXd& own, const Eigen::VectorXd& left, d
     const double window = 1.0 - static_cast<double>(lag) / static_cast<double>(lags + 1);
     sum += 2.0 * window * at_lag(left, lag) / dof * at_lag(own, lag);
   }
-  return std::max(sum, white);
+  return std::max({sum, white, own.cwiseProduct(left).squaredNorm()});
 }
 
 /// The log where commands at rows that were lost are taken to be between those beside them: each after a gap is then as

@@ -130,7 +130,8 @@ Eigen::Vector3d paper_pan_tilt(double t_s, double mean_tilt_rad) {
 }
 
 std::vector<Eigen::Vector2d> draw_points(int width_px, int height_px, int count, std::uint64_t seed) {
-  constexpr double margin_px = 60.0, min_height_px = 40.0;
+  const double margin_px = std::min(60.0, 0.25 * std::min(width_px, height_px));
+  double min_height_px = 40.0;
   Draws draws(seed);
   std::vector<Eigen::Vector2d> points;
   const auto fits = [&](const Eigen::Vector2d& c) {
@@ -147,7 +148,11 @@ std::vector<Eigen::Vector2d> draw_points(int width_px, int height_px, int count,
   // With many points no triangle can be asked to be wide.
   const std::size_t demanding = std::min<std::size_t>(static_cast<std::size_t>(count), 6);
   for (int tries = 0; points.size() < static_cast<std::size_t>(count); ++tries) {
-    if (tries % 1000 == 999 && points.size() < demanding) points.clear();  // these leave no room for another
+    if (tries % 1000 == 999 && points.size() < demanding) {
+      points.clear();  // these leave no room for another
+      constexpr int enough = 50'000;
+      if (tries > enough) min_height_px *= 0.7;  // in a small image there is none
+    }
     const double x = draws.uniform(margin_px, width_px - margin_px),
                  y = draws.uniform(margin_px, height_px - margin_px);
     if (points.size() >= demanding || fits({x, y})) points.emplace_back(x, y);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
@@ -94,6 +95,38 @@ TEST(MountingStep, IsNamedWithItsTime) {
     }
     EXPECT_LE(beyond, sets / 20);
     EXPECT_GE(named, method == ObserveMethod::hybrid ? sets - sets / 10 : sets / 2) << "of " << sets;
+  }
+}
+
+/// In a log of 4 s a delay of 10 to 20 ms looks like zooms, and they like a step of the mounting: it is estimated.
+TEST(MountingStep, IsNotTakenForADelayOfAShortLog) {
+  constexpr double degrees_15 = 0.25, degrees_8 = 0.14;
+  for (const double delay_s : {0.010, 0.015, 0.020}) {
+    RotationScene scene;
+    scene.width_px = 320;
+    scene.height_px = 240;
+    scene.start_px = draw_points(320, 240, 20, 7);
+    scene.intrinsics = [](double) { return RotatingIntrinsics{350.0, 350.0, 159.5, 119.5}; };
+    scene.motion = [](double t_s) {
+      return Eigen::Vector3d(degrees_15 * std::sin(2.0 * std::numbers::pi * t_s / 5.0),
+                             degrees_8 * std::sin(2.0 * std::numbers::pi * t_s / 3.3 + 0.5), 0.0);
+    };
+    RotationLogConfig log_config;
+    log_config.source = RotationSource::head;
+    log_config.duration_s = 4.0;
+    log_config.sigma_px = 0.02;
+    log_config.clip_to_image = true;
+    scene.delay_s = delay_s;
+    RotationLog log = simulate_rotation(scene, log_config, 1);
+    log.sigma_scale = log.sigma_parallax = 0.0;
+    ObserveSetup config = config_of(ObserveMethod::hybrid);
+    config.width_px = 320;
+    config.height_px = 240;
+    const ObserveSolution report = solve_intrinsics(log, config);
+    EXPECT_FALSE(report.mounting_step) << delay_s;
+    EXPECT_TRUE(report.estimated.delay) << delay_s;
+    EXPECT_LT(report.quantities[0].sigma, 0.1) << delay_s << ": 1 beside a step";
+    EXPECT_NEAR(report.quantities[0].value, 350.0, 4.0 * report.quantities[0].sigma) << delay_s;
   }
 }
 

@@ -70,6 +70,48 @@ double rejected_share(const ObserveSolution& report) {
   return out / std::max(1.0, out + static_cast<double>(report.reference.bundle.observations.size()));
 }
 
+/// Whether one of what all rows ask for most, once it is estimated, leaves no more noise than this.
+bool a_cause_explains(const RotationLog& log, const ObserveSetup& whole, ObserveSolution& all, double noise_px,
+                      const Progress& progress) {
+  constexpr double as_well = 1.05;
+  constexpr std::size_t most = 4;
+  std::vector<CauseScore> causes = all.causes;
+  std::erase_if(causes, [&](const CauseScore& cause) { return cause.z < asked_beyond(all); });
+  std::ranges::sort(causes, std::ranges::greater{}, &CauseScore::gain);
+  for (std::size_t i = 0; i < std::min(most, causes.size()); ++i) {
+    ObserveSetup freer = whole;
+    if (!free_cause(causes[i].name, log, freer)) continue;
+    const ObserveSolution freed = solve_as_given(log, freer, progress);
+    if (!is_answer(freed) || !(freed.sigma_px < as_well * noise_px)) continue;
+    all.causes = {causes[i]};  // far from the optimum the scores' order is not theirs
+    return true;
+  }
+  return false;
+}
+
+/// A step of the mounting that explains as much as the zooms of the report.
+std::optional<MountingStep> step_instead(const RotationLog& log, const ObserveSetup& config,
+                                         const ObserveSolution& report, const Progress& progress) {
+  constexpr double as_well = 1.1, less = 0.9;  // than the zooms, and than neither
+  return mounting_step(log, config, report, as_well * report.sigma_px, less, progress);
+}
+
+/// A camera that was bumped: each part of the log seems to be of another one. In a short log a constant cause does what
+/// a step does as well: then that is asked for. False: neither.
+bool takes_step(const RotationLog& log, const ObserveSetup& config, const ObserveSetup& whole, const Progress& progress,
+                ObserveSolution& all, ObserveSolution& report) {
+  const auto step = step_instead(log, config, report, progress);
+  if (!step) return false;
+  if (a_cause_explains(log, whole, all, step->noise_px, progress)) {
+    report.causes = std::move(all.causes);
+    return true;
+  }
+  report = std::move(all);
+  report.mounting_step = step;
+  report.mounting_step->is_counted = true;
+  return true;
+}
+
 /// What is not modelled, and errors that last, may look like zooms, and each rest between them be explained by itself.
 /// Where all rows fit one camera nearly as well there was no zoom: theirs is the answer. Where they do not but are
 /// steady, what they ask for counts.
@@ -77,7 +119,6 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
                   ObserveSolution& report) {
   constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
   constexpr double more = 0.05;  // of the pixels: rows of another focal length are rejected together, and raise nothing
-  constexpr double as_well = 1.1, less = 0.9;  // than the zooms, and than neither: a step of the mounting
   const bool is_known = config.rotation == RotationKnowledge::known;
   if (!has_zoom(report) || report.mounting_step || !is_known || !is_answer(report) ||
       config.method != ObserveMethod::hybrid)
@@ -86,7 +127,7 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
   whole.method = ObserveMethod::batch;
   ObserveSolution all = solve_as_given(log, whole, progress);
   if (!is_answer(all)) {
-    report.mounting_step = mounting_step(log, config, report, as_well * report.sigma_px, less, progress);
+    report.mounting_step = step_instead(log, config, report, progress);
     return;
   }
   const bool rejects_rows = rejected_share(all) > rejected_share(report) + more;
@@ -99,13 +140,7 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
     report = std::move(all);
     return;
   }
-  // A camera that was bumped: each part of the log seems to be of another one.
-  if (const auto step = mounting_step(log, config, report, as_well * report.sigma_px, less, progress)) {
-    report = std::move(all);
-    report.mounting_step = step;
-    report.mounting_step->is_counted = true;
-    return;
-  }
+  if (takes_step(log, config, whole, progress, all, report)) return;
   constexpr double far_off = 3.0;  // the noise of one camera's rows beside a real zoom's: nothing is determined by them
   if (rejects_rows || all.sigma_px > far_off * report.sigma_px) return;
   const CauseScore* best = best_cause(all);

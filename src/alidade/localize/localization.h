@@ -139,7 +139,8 @@ struct Localization {
   double still_share = 0.0;   ///< Of the image, edges that never move while the scene does: masked.
   double sigma_px =
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
-  std::size_t num_lost = 0;  ///< Frames whose pose observations do not constrain: waiting or predicted.
+  std::size_t num_lost = 0;      ///< Frames whose pose observations do not constrain: waiting or predicted.
+  std::size_t num_repeated = 0;  ///< Of these, images that were the last one again while the camera moved.
   std::size_t num_restarts = 0;
   std::size_t num_left = 0;                           ///< Times that a point was removed from a full filter.
   std::size_t num_loops = 0, num_loops_rejected = 0;  ///< Loop closures; of these rejected.

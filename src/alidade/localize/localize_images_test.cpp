@@ -108,6 +108,26 @@ TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {
   }
 }
 
+/// A stream that hangs gives an image again. It shows where the camera was: the pose of the later time is predicted,
+/// with the σ of that, and the first image that is another leads back. A camera that stands still is none of these.
+TEST(LocalizeImages, ImagesThatRepeatTheLastAreNoObservations) {
+  RoomFilm video = usual_room();
+  for (std::size_t i = 31; i < 37; ++i) video.images[i] = video.images[30];
+  for (std::size_t i = video.images.size() - 8; i < video.images.size(); ++i) video.images[i] = video.images[i - 1];
+  const Localization report = localized(video, by_hand());
+  EXPECT_EQ(report.num_repeated, 14u);
+  EXPECT_EQ(report.verdict.state, State::care);
+  EXPECT_NE(report.verdict.sentence.find("14 images are the one before them"), std::string::npos)
+      << report.verdict.sentence;
+  for (std::size_t i = 0; i < report.path.size(); ++i) {
+    const Eigen::Vector3d off = report.path[i].world_from_cam.translation - video.truth[i].world_from_cam.translation;
+    EXPECT_LT(off.norm(), 5.0 * std::sqrt(report.path[i].cov.topLeftCorner<3, 3>().trace())) << i;
+  }
+  RoomFilm still = usual_room();
+  std::fill(still.images.begin() + 1, still.images.end(), still.images.front());
+  EXPECT_EQ(localized(still, by_hand()).num_repeated, 0u);
+}
+
 TEST(LocalizeImages, WithoutTheTargetThereIsNoPath) {
   RoomScene scene;
   scene.camera = room_camera();

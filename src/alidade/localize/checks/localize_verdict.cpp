@@ -244,6 +244,12 @@ void add_losses(const Localization& report, Verdict& verdict) {
   verdict.checks.push_back({"frames lost", state_of(lost, 0.0, care_lost),
                             report.num_lost == 0 ? "no frame lost" : std::to_string(report.num_lost) + " frames lost",
                             lost, care_lost, "1", "tracks"});
+  if (report.num_repeated > 0)
+    verdict.checks.push_back({"repeated images", State::care,
+                              std::to_string(report.num_repeated) +
+                                  " images are the one before them once more, byte for byte, while the camera moves, "
+                                  "as of a stream that hangs: there the pose is predicted",
+                              static_cast<double>(report.num_repeated), 0.0, "1", "tracks"});
   const double gated = gated_share(report);
   verdict.checks.push_back({"gated", state_of(gated, 0.05, bad_gated),
                             text_of(100.0 * gated, 3) + " % of the observations are rejected", gated, bad_gated, "1",

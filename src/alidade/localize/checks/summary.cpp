@@ -70,7 +70,7 @@ bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> targe
 namespace {
 
 bool is_of_targets_points(const GivenNumber& given) {
-  return given.name == "shape of the target" || given.name == "speed of the target" || given.name == "readout" ||
+  return given.name == "shape of the target" || given.name == "speed of the target" ||
          given.name == "rotation of the target";
 }
 

@@ -318,6 +318,12 @@ bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
 /// An image after the first of the path.
 void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
   predict_to(step.t_s);
+  if (is_repeated_ && should_move()) {  // a stream that hangs: seen at another time
+    ++num_repeated_;
+    tried_.clear();
+    step.event = FrameEvent::predicted;
+    return;
+  }
   enter_saved();
   std::vector<FeatureObservation> observations = look(smoothed, {config_.features.min_correlation, 0.0});
   if (config_.disturb) config_.disturb(step.frame, observations);
@@ -344,6 +350,7 @@ void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
 
 PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
   now_.clear();
+  is_repeated_ = shows_last(grey);
   PathStep step = taken(grey, smoothed_for_search(grey), frame, t_s);
   ++num_taken_;
   if (config_.smooths) kept_.add({frame, t_s, now_});

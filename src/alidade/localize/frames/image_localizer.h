@@ -1,5 +1,6 @@
 #pragma once
 
+#include <opencv2/core.hpp>
 #include <unordered_map>
 
 #include "alidade/localize/engine.h"
@@ -74,6 +75,8 @@ class ImageLocalizer {
   [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);
   void forget(long id);
   void take_next(const cv::Mat& smoothed, PathStep& step);
+  [[nodiscard]] bool shows_last(const cv::Mat& grey);
+  [[nodiscard]] bool should_move() const;
   [[nodiscard]] bool restart_in_doubt(const cv::Mat& smoothed, PathStep& step);
 
   LocalizeEngine engine_;
@@ -105,6 +108,9 @@ class ImageLocalizer {
   ImageMask shown_;                      ///< image_mask.h.
   bool lacks_circle_ = false;
   void mask(const cv::Mat& grey, const cv::Mat& smoothed);
+  cv::Mat last_image_;
+  bool is_repeated_ = false;  ///< This image is the last one, byte for byte.
+  std::size_t num_repeated_ = 0;
   StillParts still_;
   ImageMask given_mask_;  ///< `shown_` without what stands still.
   std::vector<ObservationTried> tried_;

@@ -47,6 +47,7 @@ void ImageLocalizer::sum_up(Localization& result) const {
   result.is_of_images = true;
   result.lacks_circle = lacks_circle_;
   result.still_share = still_.still_share();
+  result.num_repeated = num_repeated_;
   result.sigma_px = config_.features.sigma_floor_px;
   result.num_alike = num_alike_;
   LocalizeConfig config = config_;

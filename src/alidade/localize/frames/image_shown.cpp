@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/core.hpp>
 
+#include "alidade/estimation/median.h"
 #include "alidade/localize/frames/image_localizer.h"
 #include "alidade/localize/frames/image_mask.h"
 
-// Where images show the scene.
+// Where images show the scene, and when.
 
 namespace alidade {
 
@@ -15,6 +17,27 @@ bool ImageLocalizer::is_shown(const Eigen::Vector2d& px) const {
   return u >= 0 && v >= 0 && u < shown_.width_px && v < shown_.height_px &&
          shown_.shows[static_cast<std::size_t>(v) * static_cast<std::size_t>(shown_.width_px) +
                       static_cast<std::size_t>(u)] != 0;
+}
+
+/// Whether it is the last image, byte for byte: no camera takes two with the same noise.
+bool ImageLocalizer::shows_last(const cv::Mat& grey) {
+  const auto bytes = static_cast<std::size_t>(grey.cols);
+  bool is_same = last_image_.size() == grey.size();
+  for (int v = 0; is_same && v < grey.rows; ++v) is_same = std::memcmp(grey.ptr(v), last_image_.ptr(v), bytes) == 0;
+  if (!is_same) grey.copyTo(last_image_);
+  return is_same;
+}
+
+/// Whether what was found in the last image is expected elsewhere now. A camera that stands still in a scene without
+/// noise gives the same image, too.
+bool ImageLocalizer::should_move() const {
+  constexpr double still_px = 0.3;
+  std::vector<double> moved_px;
+  for (const auto& [id, landmark] : landmarks_) {
+    const auto expected = engine_.best().expected(id);
+    if (expected && landmark.num_found > 0) moved_px.push_back((expected->px - landmark.last_px).norm());
+  }
+  return !moved_px.empty() && median_of(std::move(moved_px)) > still_px;
 }
 
 /// The mask that is given, or the circle of the first image that shows one; without what stands still. What was found

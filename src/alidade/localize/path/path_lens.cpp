@@ -58,6 +58,7 @@ double PathSmoother::best_cause(const Asked& all) const {
   const Eigen::Index causes = causes_at_ - lens_at_;
   double best = 0.0;
   for (const auto& [first, num] : {std::pair{shape_cause, 1}, {speed_cause, 3}, {readout_cause, 1}, {turn_cause, 3}}) {
+    if (!problem_.compares_causes && first != readout_cause) continue;
     const Eigen::MatrixXd information = all.information.block(causes + first, causes + first, num, num);
     const Eigen::VectorXd score = all.score.segment(causes + first, num);
     if (information.diagonal().minCoeff() > 0.0) best = std::max(best, score.dot(information.ldlt().solve(score)));
@@ -83,7 +84,7 @@ bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   };
   constexpr double far_more = 60.0;
   if (!(explained(score, noise * information + information * known * information) > far_more)) return false;
-  return !problem_.compares_causes || explained(score, information) > best_cause(all);
+  return explained(score, information) > best_cause(all);
 }
 
 }  // namespace alidade

@@ -84,7 +84,8 @@ struct SmootherProblem {
   PathGauge gauge = PathGauge::fixed;
   double sigma_scale = 0.0;  ///< Of the known points' common scale, counted and not estimated.
   bool frees_lens = false;   ///< A lens that the observations contradict is estimated, without what was given of it.
-  /// That only where shape and speed of the target or a readout, which observations of a table show, explain less.
+  /// That only where a readout explains less; and with this shape and speed of the target, too, which observations of a
+  /// table show.
   bool compares_causes = false;
   std::optional<Lens> freed_lens;   ///< Estimated so, to begin at where it already was.
   std::optional<SmootherImu> imu;   ///< Its unit of length is then the metre.

@@ -23,7 +23,9 @@ double slope_at(std::span<const ServoSample> log, std::size_t i) {
   const double before = (log[i].command - log[i - 1].command) / before_s;
   const double after = (log[i + 1].command - log[i].command) / after_s;
   if (before == 0.0 || after == 0.0) return 0.0;
-  const auto is_regular = [&](std::size_t k) { return std::abs(log[k].t_s - log[k - 1].t_s - after_s) < same * after_s; };
+  const auto is_regular = [&](std::size_t k) {
+    return std::abs(log[k].t_s - log[k - 1].t_s - after_s) < same * after_s;
+  };
   if (i > 1 && i + 2 < log.size() && is_regular(i - 1) && is_regular(i) && is_regular(i + 2)) {
     const double far = log[i + 2].command - log[i - 2].command, near = log[i + 1].command - log[i - 1].command;
     return (8.0 * near - far) / (12.0 * after_s);
@@ -39,9 +41,7 @@ double command_between(std::span<const ServoSample> log, std::size_t i, double s
 }
 
 /// By how much of a row commands act later in a log that has them at its rows than they do.
-double late_rows(std::size_t per_row) {
-  return per_row == 0 ? 0.0 : 0.5 * (1.0 - 1.0 / static_cast<double>(per_row));
-}
+double late_rows(std::size_t per_row) { return per_row == 0 ? 0.0 : 0.5 * (1.0 - 1.0 / static_cast<double>(per_row)); }
 
 /// The fit of the log with so many commands, and Σ misfit².
 struct Hypothesis {
@@ -101,8 +101,7 @@ std::vector<ServoSample> with_commands_between(std::span<const ServoSample> log,
   std::vector<ServoSample> rows;
   if (per_row == 0) return {log.begin(), log.end()};
   const bool is_continuous = per_row == continuous_commands;
-  const double step_s =
-      usual_spacing(log) / (is_continuous ? steps_of_all_the_time : static_cast<double>(per_row));
+  const double step_s = usual_spacing(log) / (is_continuous ? steps_of_all_the_time : static_cast<double>(per_row));
   for (std::size_t i = 0; i < log.size(); ++i) {
     const double gap_s = i + 1 < log.size() ? log[i + 1].t_s - log[i].t_s : 0.0;
     const double num = std::clamp(std::round(gap_s / step_s), 1.0, 100.0);  // of a pause no more
@@ -111,7 +110,8 @@ std::vector<ServoSample> with_commands_between(std::span<const ServoSample> log,
       row.t_s += k / num * gap_s;
       if (k > 0.0) row.command = command_between(log, i, k / num);
       if (k > 0.0) row.sampled_t_s = log[i].read_s();
-      if (is_continuous) row.command_t_s = row.t_s - 0.5 * gap_s / num;  // half-way through the piece that it stands for
+      if (is_continuous)
+        row.command_t_s = row.t_s - 0.5 * gap_s / num;  // half-way through the piece that it stands for
       rows.push_back(row);
     }
   }

@@ -15,9 +15,9 @@ inline constexpr std::size_t continuous_commands = 1000;
 /// given: the controller may give more of them than rows are logged.
 [[nodiscard]] bool has_frequent_commands(std::span<const ServoSample> log);
 
-/// The log with the commands that were given between its rows, `per_row` in the usual time from one to the next, each on
-/// the cubic through its neighbours (C. de Boor, "A practical guide to splines", 1978, IV); 0: none. Rows that are added
-/// are no readings: they repeat the sample of the row before them.
+/// The log with the commands that were given between its rows, `per_row` in the usual time from one to the next, each
+/// on the cubic through its neighbours (C. de Boor, "A practical guide to splines", 1978, IV); 0: none. Rows that are
+/// added are no readings: they repeat the sample of the row before them.
 [[nodiscard]] std::vector<ServoSample> with_commands_between(std::span<const ServoSample> log, std::size_t per_row);
 
 /// How many commands there are from row to row, by the plain model: where 2 ln of the likelihood ratio against the log

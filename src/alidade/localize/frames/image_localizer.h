@@ -1,6 +1,6 @@
 #pragma once
 
-#include <opencv2/core.hpp>
+#include <cstdint>
 #include <unordered_map>
 
 #include "alidade/localize/engine.h"
@@ -108,8 +108,8 @@ class ImageLocalizer {
   ImageMask shown_;                      ///< image_mask.h.
   bool lacks_circle_ = false;
   void mask(const cv::Mat& grey, const cv::Mat& smoothed);
-  cv::Mat last_image_;
-  bool is_repeated_ = false;  ///< This image is the last one, byte for byte.
+  std::vector<std::uint8_t> last_image_;  ///< Row by row.
+  bool is_repeated_ = false;              ///< This image is the last one, byte for byte.
   std::size_t num_repeated_ = 0;
   StillParts still_;
   ImageMask given_mask_;  ///< `shown_` without what stands still.

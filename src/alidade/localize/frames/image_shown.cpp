@@ -22,10 +22,13 @@ bool ImageLocalizer::is_shown(const Eigen::Vector2d& px) const {
 /// Whether it is the last image, byte for byte: no camera takes two with the same noise.
 bool ImageLocalizer::shows_last(const cv::Mat& grey) {
   const auto bytes = static_cast<std::size_t>(grey.cols);
-  bool is_same = last_image_.size() == grey.size();
-  for (int v = 0; is_same && v < grey.rows; ++v) is_same = std::memcmp(grey.ptr(v), last_image_.ptr(v), bytes) == 0;
-  if (!is_same) grey.copyTo(last_image_);
-  return is_same;
+  bool is_same = last_image_.size() == bytes * static_cast<std::size_t>(grey.rows);  // of one camera: one width
+  const auto kept = [&](int v) { return last_image_.data() + bytes * static_cast<std::size_t>(v); };
+  for (int v = 0; is_same && v < grey.rows; ++v) is_same = std::memcmp(grey.ptr(v), kept(v), bytes) == 0;
+  if (is_same) return true;
+  last_image_.resize(bytes * static_cast<std::size_t>(grey.rows));
+  for (int v = 0; v < grey.rows; ++v) std::memcpy(kept(v), grey.ptr(v), bytes);
+  return false;
 }
 
 /// Whether what was found in the last image is expected elsewhere now. A camera that stands still in a scene without

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "alidade/calibrate/checks/better_model.h"
+#include "alidade/calibrate/checks/corner_numbering.h"
 #include "alidade/calibrate/solve/weights.h"
 
 namespace alidade {
@@ -250,17 +251,12 @@ Check principal_point(const CalibrateReport& report) {
 
 /// Whether the printed side of a flat board is seen as if through it: z of the board points away from who sees it.
 Check from_the_front(const CalibrateReport& report, std::span<const BoardView> views) {
-  constexpr double flat = 0.1;  // of its largest coordinate; others may be seen from anywhere
-  double size = 0.0, height = 0.0;
-  for (const Eigen::Vector3d& point : report.board_points) {
-    size = std::max(size, point.head<2>().cwiseAbs().maxCoeff());
-    height = std::max(height, std::abs(point.z()));
-  }
+  const bool is_flat = is_nearly_flat(report.board_points);
   std::size_t behind = 0, seen = 0;
   std::string photo;
   for (std::size_t i = 0; i < report.views.size(); ++i) {
     const ViewFit& view = report.views[i];
-    if (!view.used || height > flat * size) continue;
+    if (!view.used || !is_flat) continue;
     ++seen;
     if (view.cam_from_board.inverse().translation.z() > 0.0 && behind++ == 0) photo = views[i].photo;
   }

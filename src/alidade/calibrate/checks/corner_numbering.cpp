@@ -79,16 +79,6 @@ std::string fitting_numbering(const Board& board, const BoardView& view, const N
   return "";
 }
 
-bool is_flat(std::span<const Eigen::Vector3d> board_points) {
-  constexpr double flat = 0.1;
-  double size = 0.0, height = 0.0;
-  for (const Eigen::Vector3d& point : board_points) {
-    size = std::max(size, point.head<2>().cwiseAbs().maxCoeff());
-    height = std::max(height, std::abs(point.z()));
-  }
-  return height <= flat * size;
-}
-
 /// Those few that are seen from behind, where most are not.
 void name_few_behind(std::span<const std::optional<Perspective>> found, std::vector<std::string>& faults) {
   std::size_t behind = 0, seen = 0;
@@ -108,6 +98,16 @@ void name_few_behind(std::span<const std::optional<Perspective>> found, std::vec
 
 }  // namespace
 
+bool is_nearly_flat(std::span<const Eigen::Vector3d> board_points) {
+  constexpr double flat = 0.1;
+  double size = 0.0, height = 0.0;
+  for (const Eigen::Vector3d& point : board_points) {
+    size = std::max(size, point.head<2>().cwiseAbs().maxCoeff());
+    height = std::max(height, std::abs(point.z()));
+  }
+  return height <= flat * size;
+}
+
 std::vector<std::string> numbering_faults(const Board& board, std::span<const BoardView> views,
                                           std::span<const Eigen::Vector3d> board_points) {
   const Numbering as_given = [&](int i) -> Eigen::Vector2d {
@@ -121,7 +121,7 @@ std::vector<std::string> numbering_faults(const Board& board, std::span<const Bo
     if (found[k]) misfits.push_back(found[k]->misfit);
   }
   std::vector<std::string> faults(views.size());
-  if (misfits.empty() || !is_flat(board_points)) return faults;
+  if (misfits.empty() || !is_nearly_flat(board_points)) return faults;
   constexpr double doubtful = 0.5, none = 1.0, usual = 0.25;  // spacings; strong distortion makes some 0.3
   const bool others_fit = median_of(misfits) < usual;
   for (std::size_t k = 0; k < views.size(); ++k) {

@@ -9,10 +9,15 @@
 
 namespace alidade {
 
+/// Whether points [m, board frame] are within a tenth of their largest coordinate of the plane z = 0: from behind
+/// others may be seen as well.
+[[nodiscard]] bool is_nearly_flat(std::span<const Eigen::Vector3d> board_points);
+
 /// For each view what is wrong with how its corners are numbered, or with its image; empty where nothing is. A
 /// perspective of the plane of the board takes the points to the corners but for distortion (Hartley & Zisserman,
 /// §2.3): far from one is a view that another numbering brings to one, or that alone of all is in none. The view of a
-/// board from behind is a fault where most views are from the front, of a board that is flat.
+/// board from behind is a fault where most views are from the front, of a board that is flat. `board_points` [m]: by
+/// number, in the board frame.
 [[nodiscard]] std::vector<std::string> numbering_faults(const Board& board, std::span<const BoardView> views,
                                                         std::span<const Eigen::Vector3d> board_points);
 

@@ -181,7 +181,7 @@ TEST(ProjectionSigma, IsNothingOutsideTheLensAndWithoutACovariance) {
   for (const double sigma_px : projection_sigma(camera, 6, 4, infinity).values) EXPECT_TRUE(std::isnan(sigma_px));
 }
 
-TEST(ProjectionSigma, OfAImageTakesMilliseconds) {
+TEST(Speed, ProjectionSigmaOfAnImageTakesMilliseconds) {
   const Camera camera = distorted_camera();
   double best_s = infinity;
   for (int i = 0; i < 5; ++i) {

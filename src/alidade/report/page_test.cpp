@@ -60,7 +60,7 @@ TEST(ReportPage, ImagesAreInertBlocks) {
   EXPECT_THAT(page, Not(HasSubstr("<img src=x")));
 }
 
-TEST(ReportPage, ThirteenPhotosTakeNoTime) {
+TEST(Speed, APageOfThirteenPhotosTakesNoTime) {
   std::map<std::string, std::string> images;
   for (int i = 0; i < 13; ++i) images[std::to_string(i)] = std::string(40'000, 'x');
   const std::string document = sample().dump() + std::string(200'000, ' ');

@@ -89,7 +89,7 @@ TEST(HeadServo, AllocatesNothing) {
 }
 
 /// Two heads in a period: twice the time of one, with the simulated head in it.
-TEST(HeadServo, TakesLessThanFiftyMicrosecondsAStep) {
+TEST(Speed, HeadServoTakesLessThanFiftyMicrosecondsAStep) {
   if (!testing::times_count) GTEST_SKIP() << "a build with sanitizers, or for debugging";
   for (const ServoPlant& plant : {ServoPlant(AnglePlant{}), ServoPlant(RatePlant{})}) {
     for (const ControllerKind kind : controller_kinds) {

@@ -388,7 +388,7 @@ double seconds_a_step(int num_points) {
 }
 
 /// Bounds for a loaded machine; docs/performance.md has what an idle one needs.
-TEST(Hybrid, KeepsUpWithACameraOfAThousandPoints) {
+TEST(Speed, HybridKeepsUpWithACameraOfAThousandPoints) {
   const double of_four_s = seconds_a_step(4), of_thousand_s = seconds_a_step(1000);
   std::printf("a step: 4 points %.2f us, 1000 points %.3f ms\n", 1e6 * of_four_s, 1e3 * of_thousand_s);
   if (!testing::times_count) GTEST_SKIP() << "a build with sanitizers, or for debugging";

@@ -284,7 +284,9 @@ TEST_F(RotationLogText, RoundTrip) {
   }
 }
 
-TEST_F(RotationLogText, TenThousandRowsOfTwentyPointsTakeNoTime) {
+class Speed : public RotationLogText {};
+
+TEST_F(Speed, TenThousandRowsOfTwentyPointsTakeNoTime) {
   RotationScene scene;
   scene.start_px = draw_points(780, 582, 20, 1);
   scene.motion = paper_rate;

@@ -9,10 +9,10 @@
 
 namespace alidade {
 
-/// Takes over the values of fields from a YAML file of `name: value`, the names as the fields have them; lists as
-/// [a, b]. Those for which `is_typed` are left as they are: what was typed beats the file. Returns the names that stand
-/// in the file. Throws InputError: not YAML, a key that is no field (the known are named), a value that the field does
-/// not take.
+/// Takes over the values of fields from a YAML file of `name: value`, the names those of the fields ("square_m") or of
+/// their options ("square"); lists as [a, b]. Those for which `is_typed` are left as they are: what was typed beats the
+/// file. Returns the names of the fields that stand in the file. Throws InputError: not YAML, a key that is no field
+/// (the known are named), a field given twice, a value that the field does not take.
 std::vector<std::string> read_config(const std::filesystem::path& file, const FieldList& fields,
                                      const std::function<bool(const Field&)>& is_typed);
 

@@ -53,6 +53,29 @@ TEST_F(ConfigFile, IsTakenOverButForWhatWasTyped) {
   EXPECT_EQ(names.size(), 4u);
 }
 
+TEST_F(ConfigFile, TakesTheNamesOfOptions) {
+  bool is_dark = false;
+  double noise_px = 0.0, gap_m = 0.0;
+  const FieldList fields{
+      {.name = "image_noise_px", .value = &noise_px, .help = "Noise [px]"},
+      {.name = "gap_m", .value = &gap_m, .help = "Gap [m]", .option = "--distance", .old_options = {"--far-off"}},
+      {.name = "is_dark", .value = &is_dark, .help = "Dark", .option = "--dark"}};
+  const auto read = [&](const std::string& text) {
+    write_file(path() / "run.yaml", text);
+    return read_config(path() / "run.yaml", fields, [](const Field&) { return false; });
+  };
+  EXPECT_THAT(read("image-noise: 0.25\ndistance: 2\ndark: true\n"),
+              ::testing::ElementsAre("image_noise_px", "gap_m", "is_dark"));
+  EXPECT_EQ(noise_px, 0.25);
+  EXPECT_EQ(gap_m, 2.0);
+  EXPECT_TRUE(is_dark);
+  EXPECT_THAT(read("image_noise: 0.5\nfar-off: 3\n"), ::testing::ElementsAre("image_noise_px", "gap_m"));
+  EXPECT_EQ(noise_px, 0.5);
+  EXPECT_EQ(gap_m, 3.0);
+  EXPECT_THROW(read("gap: 3\n"), InputError) << "the option has another name";
+  EXPECT_THROW(read("distance: 3\ngap_m: 2\n"), InputError) << "twice";
+}
+
 TEST_F(ConfigFile, NamesWhatIsWrong) {
   EXPECT_THAT(fault("gapp_m: 1\n"), ::testing::HasSubstr("gapp_m: is not a key of this command; known: gap_m count"));
   EXPECT_THAT(fault("gap_m: nan\n"), ::testing::HasSubstr("gap_m: 'nan' is not a finite number"));

@@ -63,6 +63,27 @@ std::vector<std::string> place_in_pair(const YAML::Node& root, const Fields& fie
   return unread;
 }
 
+/// The number of a scalar that a ROS message may have; `otherwise` where it has none.
+double loose_number(const YAML::Node& map, const char* key, double otherwise) {
+  const YAML::Node value = map.IsMap() ? map[key] : YAML::Node();
+  return value.IsDefined() && value.IsScalar() ? value.as<double>(otherwise) : otherwise;
+}
+
+/// A CameraInfo message has the lens of the whole image at full resolution, whatever images come with it. Binning of 0
+/// means 1, a region without a size the whole image.
+std::vector<std::string> other_images(const YAML::Node& root, const Camera& camera) {
+  std::vector<std::string> unread;
+  const double binning_x = loose_number(root, "binning_x", 0.0), binning_y = loose_number(root, "binning_y", 0.0);
+  if (binning_x > 1.0 || binning_y > 1.0) unread.emplace_back("the binning (the lens is that of full resolution)");
+  const YAML::Node roi = root["roi"];
+  if (!roi.IsDefined() || !roi.IsMap()) return unread;
+  const double width = loose_number(roi, "width", 0.0), height = loose_number(roi, "height", 0.0);
+  const bool is_moved = loose_number(roi, "x_offset", 0.0) != 0.0 || loose_number(roi, "y_offset", 0.0) != 0.0;
+  const bool is_smaller = (width != 0.0 && width != camera.width_px) || (height != 0.0 && height != camera.height_px);
+  if (is_moved || is_smaller) unread.emplace_back("the region of interest roi (the lens is that of the whole image)");
+  return unread;
+}
+
 void require_no_choice(const CameraText& file) {
   if (!file.choice.empty()) refuse(file.name, "", "holds one camera without a name; leave ':" + file.choice + "' out");
 }
@@ -138,7 +159,9 @@ CameraContent read_ros(const YAML::Node& root, const CameraText& file) {
   }
   camera.width_px = fields.size(first_of(fields, {"image_width", "width"}));
   camera.height_px = fields.size(first_of(fields, {"image_height", "height"}));
-  return {camera, place_in_pair(root, fields)};
+  std::vector<std::string> unread = place_in_pair(root, fields);
+  for (std::string& what : other_images(root, camera)) unread.push_back(std::move(what));
+  return {camera, std::move(unread)};
 }
 
 std::string write_ros(const Camera& camera) {

@@ -258,6 +258,13 @@ TEST(CameraFile, WhatIsNotReadIsNamed) {
   EXPECT_EQ(ros(straight, "P: [490,0,321,-49,0,490,241,0,0,0,1,0]\n"), "the baseline in the projection matrix P");
   EXPECT_EQ(ros(straight, "p: [490,0,321,0,0,490,241,-49,0,0,1,0]\n"), "the baseline in the projection matrix P");
   EXPECT_EQ(ros(turned, ""), "the rectification matrix R");
+  const std::string whole = "binning_x: 0\nbinning_y: 1\nroi: {x_offset: 0, y_offset: 0, height: 0, width: 0}\n";
+  EXPECT_EQ(ros(straight, whole), "");
+  EXPECT_EQ(ros(straight, "roi: {x_offset: 0, y_offset: 0, height: 480, width: 640, do_rectify: false}\n"), "");
+  EXPECT_EQ(ros(straight, "binning_x: 2\nbinning_y: 2\nroi: none\n"),
+            "the binning (the lens is that of full resolution)");
+  EXPECT_EQ(ros(straight, "roi: {x_offset: 100, y_offset: 0, height: 240, width: 320}\n"),
+            "the region of interest roi (the lens is that of the whole image)");
   EXPECT_EQ(ros("R: [1,0]\n", "P: none\n"), "the rectification matrix R") << "not read, so not refused either";
 
   EXPECT_EQ(unread("3 PINHOLE 640 480 500 500 320 240\n5 PINHOLE 640 480 600 600 320 240\n", ":5"),

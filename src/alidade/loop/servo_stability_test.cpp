@@ -89,5 +89,27 @@ TEST(ServoStability, SlowLoopsAreNotRefused) {
   EXPECT_NEAR(radius, std::exp(-0.02 * 0.05), 2e-5);
 }
 
+/// kp is per pixel, and a long lens has more of them: 2 + 10/s round 0.0567/(0.1 s + 1) deg with f = 6000 px has
+/// ρ = 3.82, worked out independently. Whichever head comes first.
+TEST(ServoStability, EveryHeadsLensIsChecked) {
+  for (const bool is_first : {false, true}) {
+    ServoScenario scenario;
+    scenario.controllers = {ControllerKind::pi, ControllerKind::feedforward};
+    Camera& camera = scenario.scene.heads[is_first ? 0 : 1].camera;
+    Eigen::VectorXd values = params(camera.lens);
+    values.head<2>().setConstant(6000.0);
+    camera.lens = with_params(camera.lens, values);
+    const std::vector<LoopCheck> loops = check_loops(scenario);
+    for (const LoopCheck& loop : loops) {
+      EXPECT_NEAR(loop.analysis.sampled_radius, 3.824, 5e-3);
+      EXPECT_EQ(loop.head, is_first ? 0u : 1u);
+    }
+    const ServoStudy study = study_servo(scenario, 1);
+    EXPECT_EQ(study.status, ServoStudy::Status::unstable);
+    const std::string sentence = servo_verdict(scenario, study).sentence;
+    EXPECT_NE(sentence.find(is_first ? "of head 1" : "of head 2"), std::string::npos) << sentence;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

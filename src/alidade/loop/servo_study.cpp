@@ -27,6 +27,14 @@ AngleUnit unit_of(const ServoPlant& plant) {
   return std::visit([](const auto& p) { return p.unit; }, plant);
 }
 
+/// " of head 2", where there are heads with different lenses.
+std::string of_head(const ServoScenario& scenario, const LoopCheck& loop) {
+  const std::vector<RigHead>& heads = scenario.scene.heads;
+  const bool are_alike = std::ranges::all_of(
+      heads, [&](const RigHead& head) { return focal_of(head.camera) == focal_of(heads[0].camera); });
+  return are_alike ? "" : " of head " + std::to_string(loop.head + 1);
+}
+
 /// A loop that predicts where the target is from pixels that it takes by too short a lens.
 Verdict restless(const ServoScenario& scenario, const LoopCheck& loop) {
   Verdict verdict;
@@ -44,7 +52,7 @@ Verdict restless(const ServoScenario& scenario, const LoopCheck& loop) {
 Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
   if (loop.analysis.is_stable()) return restless(scenario, loop);
   const ServoPlant& plant = scenario.scene.axes[0].plant;
-  const double focal_px = focal_of(scenario.scene.heads[0].camera);
+  const double focal_px = focal_of(scenario.scene.heads[loop.head].camera);
   const ServoPlant other = in_other_unit(plant);
   const LoopAnalysis as_other =
       analysed(other, scenario.config.pi.per_rad(focal_px), scenario.scene.period_s, std::max(0, loop.delay_samples));
@@ -53,7 +61,7 @@ Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
   verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = "the loop of " + std::string(controller_name(loop.controller)) + " sampled each " +
                      text_of(scenario.scene.period_s) + " s is unstable: spectral radius " +
-                     text_of(loop.analysis.sampled_radius, 4);
+                     text_of(loop.analysis.sampled_radius, 4) + of_head(scenario, loop);
   if (loop.delay_samples >= 0)
     verdict.sentence +=
         ", loop gain " + text_of(loop.loop_gain, 4) + " error units per " + std::string(unit_name(unit_of(plant)));
@@ -94,7 +102,8 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
   for (const LoopCheck& loop : study.loops) {
     const double most = loop.delay_samples < 0 ? 0.995 : 0.98;  // one that was tried has a slow observer in it, too
     add("loop of " + std::string(controller_name(loop.controller)), loop.analysis.sampled_radius < most,
-        "spectral radius " + text_of(loop.analysis.sampled_radius, 4), loop.analysis.sampled_radius, most, "1");
+        "spectral radius " + text_of(loop.analysis.sampled_radius, 4) + of_head(scenario, loop),
+        loop.analysis.sampled_radius, most, "1");
   }
 }
 
@@ -109,7 +118,7 @@ std::vector<double> evenly(double low, double high, int points) {
 namespace {
 
 /// A controller, tried on both axes as they are.
-double settling_of(const ServoScenario& scenario, ControllerKind kind) {
+double settling_of(const ServoScenario& scenario, ControllerKind kind, double focal_px) {
   const ServoScene& scene = scenario.scene;
   ServoConfig config = scenario.config;
   config.controller = kind;
@@ -118,8 +127,7 @@ double settling_of(const ServoScenario& scenario, ControllerKind kind) {
   for (const ServoAxis& known : scene.axes) {
     ServoAxis real = known;
     real.plant = scaled(known.plant, scene.mismatch.gain, scene.mismatch.tau);
-    slowest =
-        std::max(slowest, settling_per_period(config, known, real, focal_of(scene.heads[0].camera), scene.latency_s));
+    slowest = std::max(slowest, settling_per_period(config, known, real, focal_px, scene.latency_s));
   }
   return slowest;
 }
@@ -146,6 +154,31 @@ double rest_px_of(const ServoScenario& scenario, ControllerKind kind) {
 bool is_whole(double delay_s, double period_s) {
   const double samples = delay_s / period_s;
   return std::abs(samples - std::round(samples)) < 1e-9;
+}
+
+/// Of one focal length; the lens becomes `largest` times as long, unknown to the loop.
+LoopCheck loop_of(const ServoScenario& scenario, ControllerKind kind, double focal_px, double largest) {
+  const ServoScene& scene = scenario.scene;
+  const bool is_pi = kind == ControllerKind::pi;
+  const ServoAxis& axis = scene.axes[0];
+  LoopCheck loop{kind, {}, 0.0, -1};
+  if (!is_pi && !(kind == ControllerKind::feedforward && std::holds_alternative<AnglePlant>(axis.plant))) {
+    loop.analysis.sampled_radius = settling_of(scenario, kind, focal_px);
+    return loop;
+  }
+  const ServoPlant plant = scaled(axis.plant, scene.mismatch.gain, scene.mismatch.tau);
+  // An image waits for the next period, a command does not.
+  const int late = is_pi ? samples_in(scene.latency_s, scene.period_s) : 0;
+  loop.delay_samples = late + samples_in(axis.command_delay_s, scene.period_s);
+  const double factor = is_pi ? largest : 1.0;  // what corrects feedforward looks at the encoder
+  loop.loop_gain = units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant)) * factor;
+  const PiGains gains = scenario.config.pi.per_rad(focal_px);
+  loop.analysis =
+      analysed(plant, {factor * gains.kp, factor * gains.ki, gains.unit}, scene.period_s, loop.delay_samples);
+  // The formula is for whole periods and a first-order plant.
+  if (!is_whole(axis.command_delay_s, scene.period_s) || axis.second_tau_s > 0.0)
+    loop.analysis.sampled_radius = settling_of(scenario, kind, focal_px);
+  return loop;
 }
 
 }  // namespace
@@ -180,35 +213,21 @@ bool LoopCheck::is_stable() const { return analysis.is_stable() && rest_px < max
 std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   std::vector<LoopCheck> loops;
   const ServoScene& scene = scenario.scene;
-  const double focal_px = focal_of(scene.heads[0].camera);
-  PiGains gains = scenario.config.pi.per_rad(focal_px);
   // A lens that zooms while the loop keeps its old focal length is that much more gain.
   const double largest = scene.intrinsics == LensKnowledge::given ? scene.zoom.largest() : 1.0;
-  gains.kp *= largest;
-  gains.ki *= largest;
   for (const ControllerKind kind : scenario.controllers) {
-    const bool is_pi = kind == ControllerKind::pi;
-    const ServoAxis& axis = scene.axes[0];
-    LoopCheck loop{kind, {}, 0.0, -1};
-    if (!is_pi && largest > 1.0) loop.rest_px = rest_px_of(scenario, kind);
-    if (!is_pi && !(kind == ControllerKind::feedforward && std::holds_alternative<AnglePlant>(axis.plant))) {
-      loop.analysis.sampled_radius = settling_of(scenario, kind);
-      loops.push_back(loop);
-      continue;
+    LoopCheck worst{kind, {}, 0.0, -1};
+    for (std::size_t head = 0; head < scene.heads.size(); ++head) {
+      const double focal_px = focal_of(scene.heads[head].camera);
+      const bool is_known = std::any_of(scene.heads.begin(), scene.heads.begin() + static_cast<std::ptrdiff_t>(head),
+                                        [&](const RigHead& before) { return focal_of(before.camera) == focal_px; });
+      if (is_known) continue;
+      LoopCheck loop = loop_of(scenario, kind, focal_px, largest);
+      loop.head = head;
+      if (head == 0 || loop.analysis.sampled_radius > worst.analysis.sampled_radius) worst = loop;
     }
-    const ServoPlant plant = scaled(axis.plant, scene.mismatch.gain, scene.mismatch.tau);
-    // An image waits for the next period, a command does not.
-    const int late = is_pi ? samples_in(scene.latency_s, scene.period_s) : 0;
-    loop.delay_samples = late + samples_in(axis.command_delay_s, scene.period_s);
-    const double factor = is_pi ? 1.0 : 1.0 / largest;  // what corrects feedforward looks at the encoder
-    loop.loop_gain =
-        units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant)) * largest * factor;
-    loop.analysis =
-        analysed(plant, {factor * gains.kp, factor * gains.ki, gains.unit}, scene.period_s, loop.delay_samples);
-    // The formula is for whole periods and a first-order plant.
-    if (!is_whole(axis.command_delay_s, scene.period_s) || axis.second_tau_s > 0.0)
-      loop.analysis.sampled_radius = settling_of(scenario, kind);
-    loops.push_back(loop);
+    if (kind != ControllerKind::pi && largest > 1.0) worst.rest_px = rest_px_of(scenario, kind);
+    loops.push_back(worst);
   }
   return loops;
 }

@@ -24,13 +24,15 @@ struct LoopCheck {
   int delay_samples = 0;   ///< −1: the controller was tried, and `sampled_radius` alone is known.
   /// RMS about a target at rest, the lens at its longest, where the loop keeps to a shorter one; 0: not tried.
   double rest_px = 0.0;
+  std::size_t head = 0;  ///< Of whose lens it is the loop: the one nearest to instability.
 
   [[nodiscard]] bool is_stable() const;
 };
 /// Of `pi`, round plant and image; of `feedforward`, the correction round plant and encoder; of all others, of
 /// `feedforward` on a rate plant, and where a command is a part of a period late or the plant has a second lag, what
 /// the controller itself does to a small offset. Each with plant and delays as they are. What predicts the target from
-/// pixels that it takes by another lens is tried on a target at rest, too.
+/// pixels that it takes by another lens is tried on a target at rest, too. Of several heads the one nearest to
+/// instability.
 [[nodiscard]] std::vector<LoopCheck> check_loops(const ServoScenario& scenario);
 
 struct ServoTrial {

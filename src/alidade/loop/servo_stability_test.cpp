@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "alidade/estimation/config_error.h"
 #include "alidade/loop/servo_study.h"
 
 // Loops that are called stable stay on a target at rest; those that are refused do not: over a grid of plants, gains,
@@ -108,6 +109,22 @@ TEST(ServoStability, EveryHeadsLensIsChecked) {
     EXPECT_EQ(study.status, ServoStudy::Status::unstable);
     const std::string sentence = servo_verdict(scenario, study).sentence;
     EXPECT_NE(sentence.find(is_first ? "of head 1" : "of head 2"), std::string::npos) << sentence;
+  }
+}
+
+/// An axis has room for 32 commands on their way; more of them would act early.
+TEST(ServoStability, CommandsThatAreTooLateAreRefusedByName) {
+  ServoScenario scenario;
+  scenario.scene.period_s = 0.01;
+  for (ServoAxis& axis : scenario.scene.axes) axis.command_delay_s = 0.32;
+  EXPECT_NO_THROW(require_sense(scenario));
+  scenario.scene.axes[1].command_delay_s = 0.33;
+  try {
+    require_sense(scenario);
+    ADD_FAILURE() << "33 periods late, and not refused";
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("command_delay_s: 0.33 is more than 32 periods"), std::string::npos)
+        << error.what();
   }
 }
 

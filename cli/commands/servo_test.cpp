@@ -185,6 +185,8 @@ TEST_F(ServoCommand, SaysWhatIsWrongWithItsScenario) {
   expect("controllers: [fuzzy]\n", "'fuzzy' is not one of");
   expect("duration_s: 1\n", "is not longer than the warm-up");
   expect("latency_s: 9.99\nsample_period_s: 0.01\n", "more than 200 images late");
+  expect("plant: {command_delay_s: 0.6}\nsample_period_s: 0.01\n",
+         "plant.command_delay_s: 0.6 is more than 32 periods of 0.01 s");
   expect("seeds: 1.5\n", "is not a whole number");
   expect("seeds: 2\nseeds: 3\n", "appears twice");
   expect("hidden_s: [3, 2]\n", "3 is not before 2");

@@ -75,8 +75,6 @@ void add_scene(FieldList& fields, ServoScene& scene) {
   add_number(fields, "noise.encoder_step_rad", scene.encoder_step_rad, angles(0.0, 90.0));
 }
 
-constexpr int max_commands_waiting = 32;  // in a DelayedAxis
-
 using Faults = std::vector<std::string>;
 
 bool ascends(const std::vector<double>& t_s) {
@@ -115,9 +113,9 @@ void check_scene(const ServoScene& scene, Faults& found) {
     if (!(axis.min_rad < axis.max_rad)) found.emplace_back("the stops of an axis: the lower one first");
   }
   const double late_s = std::max(scene.axes[0].command_delay_s, scene.axes[1].command_delay_s);
-  if (late_s > (max_commands_waiting + 1e-6) * scene.period_s)
+  if (late_s > (max_command_delay_periods + 1e-6) * scene.period_s)
     found.push_back(fmt::format("command_delay_s: {} is more than {} periods of {} s: lengthen sample_period_s", late_s,
-                                max_commands_waiting, scene.period_s));
+                                max_command_delay_periods, scene.period_s));
   if (!(scene.duration_s > scene.warm_up_s))
     found.push_back(
         fmt::format("duration_s: {} is not longer than the warm-up of {} s", scene.duration_s, scene.warm_up_s));

@@ -11,6 +11,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
+inline constexpr int max_command_delay_periods = 32;  ///< A DelayedAxis has room for as many commands on their way.
+
 /// Factors on gain and time constant, evenly from low to high.
 struct RobustnessConfig {
   double gain_low = 0.8, gain_high = 1.2;

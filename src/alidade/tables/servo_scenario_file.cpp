@@ -296,6 +296,11 @@ void read_timing(const YAML::Node& root, const Fields& top, ServoScenario& scena
            fmt::format("{} is not longer than the warm-up of {} s", scene.duration_s, scene.warm_up_s));
   if (scene.latency_s > 200.0 * scene.period_s)
     refuse(top.file(), "latency_s", fmt::format("{} is more than 200 images late", scene.latency_s));
+  if (const double delay_s = scene.axes[0].command_delay_s;
+      delay_s > (max_command_delay_periods + 1e-6) * scene.period_s)
+    refuse(top.file(), "plant.command_delay_s",
+           fmt::format("{} is more than {} periods of {} s: lengthen sample_period_s", delay_s,
+                       max_command_delay_periods, scene.period_s));
   const Section mismatch(root, top, "mismatch", {"gain", "tau"});
   mismatch.number("gain", scene.mismatch.gain, described);
   mismatch.number("tau", scene.mismatch.tau, described);

@@ -10,6 +10,7 @@
 #include "alidade/calibrate/checks/judge.h"
 #include "alidade/calibrate/checks/lens_change.h"
 #include "alidade/calibrate/checks/model_errors.h"
+#include "alidade/calibrate/checks/two_lenses.h"
 #include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/calibrate/study.h"
 #include "alidade/description/natural_order.h"
@@ -77,6 +78,19 @@ LensChangeStudy find_change(std::span<const ViewScore> scores, const OrderTaken&
     study.rivals.erase(study.rivals.begin());
   }
   return study;
+}
+
+/// Photos of two lenses, looked for where photos disagree for no other reason.
+void name_two_lenses(std::span<const ViewScore> scores, Calibration& result) {
+  std::vector<BoardView> views;  // whole: a lens of its own makes outliers of corners
+  std::vector<std::string> photos;
+  for (std::size_t k = 0; k < result.board_views.size(); ++k) {
+    if (!result.views[k].used) continue;
+    views.push_back(result.board_views[k]);
+    photos.push_back(result.board_views[k].photo);
+  }
+  const auto found = two_lenses(result.board, views, scores, result.config, result);
+  if (found) heed_two_lenses(*found, photos, result.verdict);
 }
 
 /// The board as solved: decides its shape, and solves again where that is not the one of the first solve.
@@ -152,6 +166,8 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
   heed_change(change, taken.photos, result.verdict);
+  if (result.verdict.state != State::good && !(change.change && change.change->is_proved))
+    name_two_lenses(scores, result);
   heed_assumptions(result.assumed, result.verdict);
   return result;
 }

@@ -321,9 +321,6 @@ LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateRep
   return study;
 }
 
-namespace {
-
-/// Everything but focal length and centre as all photos gave it: parts of them do not determine a lens' distortion.
 CalibrateConfig with_distortion_fixed(CalibrateConfig config, const CalibrateReport& report) {
   const std::vector<std::string> names = param_names(report.camera.lens);
   const VectorXd values = params(report.camera.lens);
@@ -337,8 +334,6 @@ CalibrateConfig with_distortion_fixed(CalibrateConfig config, const CalibrateRep
   config.board_shape = BoardShape::given;
   return config;
 }
-
-}  // namespace
 
 bool is_confirmed(const LensChange& change, const Board& board, std::span<const BoardView> used,
                   const CalibrateConfig& config, const CalibrateReport& report) {

@@ -49,6 +49,9 @@ struct LensChangeStudy {
 /// in the order taken. docs/maths/honest-sigma.md.
 [[nodiscard]] LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateReport& report);
 
+/// Everything but focal length and centre as all photos gave it: parts of them do not determine a lens' distortion.
+[[nodiscard]] CalibrateConfig with_distortion_fixed(CalibrateConfig config, const CalibrateReport& report);
+
 /// Whether the views before and after it, or near and far, calibrated apart, differ by as much, within 3σ: where lens
 /// or board are not as they are modelled, scores are not proof. `used`: the views in use, in the order taken.
 [[nodiscard]] bool is_confirmed(const LensChange& change, const Board& board, std::span<const BoardView> used,

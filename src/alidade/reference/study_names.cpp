@@ -93,7 +93,8 @@ controllers.*.
   search_s       s      mean time of search
 loops.*.
   sampled_radius    1      largest eigenvalue of the sampled loop; below 1: stable
-  bandwidth_rad_s   rad/s  of the loop
+  bandwidth_rad_s   rad/s  of the sampled loop with its delays; null: the controller was tried
+  phase_margin_deg  deg    of the sampled loop with its delays; below 0: unstable
   loop_gain         1      of the loop
 best              text  controller
 specification_px  px    asked for
@@ -102,8 +103,8 @@ data:)" + target_table_names() +
                                               R"(loops.
   controller        text   name
   loop_gain         1      of the loop
-  bandwidth_rad_s   rad/s  of the loop
-  phase_margin_deg  deg    of the loop
+  bandwidth_rad_s   rad/s  of the sampled loop with its delays; null: the controller was tried
+  phase_margin_deg  deg    of the sampled loop with its delays; below 0: unstable
   delay_samples     count  of the loop
   sampled_radius    1      largest eigenvalue
 lenses.

@@ -105,17 +105,30 @@ DataTable trials_table(const ServoStudy& study) {
            {"central_third", rounded(std::move(central), 4)}}};
 }
 
+/// What is known of a loop beside its radius; missing where the controller was tried, or there is none.
+struct LoopNumbers {
+  double gain = missing_value, bandwidth = missing_value, margin = missing_value, delay = missing_value;
+
+  explicit LoopNumbers(const LoopCheck& loop) {
+    if (loop.delay_samples < 0) return;
+    gain = loop.loop_gain;
+    delay = loop.delay_samples;
+    if (loop.analysis.bandwidth_rad_s > 0.0) bandwidth = loop.analysis.bandwidth_rad_s;
+    if (loop.analysis.crossover_rad_s > 0.0) margin = loop.analysis.phase_margin_deg;
+  }
+};
+
 DataTable loops_table(const ServoStudy& study) {
   std::vector<std::string> names;
-  std::vector<int> delays;
-  Numbers gain, bandwidth, margin, radius;
+  Numbers gain, bandwidth, margin, delays, radius;
   for (const LoopCheck& loop : study.loops) {
+    const LoopNumbers known(loop);
     names.emplace_back(controller_name(loop.controller));
-    gain.push_back(loop.loop_gain);
-    bandwidth.push_back(loop.analysis.bandwidth_rad_s);
-    margin.push_back(loop.analysis.crossover_rad_s > 0.0 ? loop.analysis.phase_margin_deg : missing_value);
+    gain.push_back(known.gain);
+    bandwidth.push_back(known.bandwidth);
+    margin.push_back(known.margin);
+    delays.push_back(known.delay);
     radius.push_back(loop.analysis.sampled_radius);
-    delays.push_back(loop.delay_samples);
   }
   return {"loops",
           {{"controller", names},
@@ -177,8 +190,10 @@ void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDo
   for (const LoopCheck& loop : study.loops) {
     JsonValue value = JsonValue::object();
     value["sampled_radius"] = loop.analysis.sampled_radius;
-    value["bandwidth_rad_s"] = loop.analysis.bandwidth_rad_s;
-    value["loop_gain"] = loop.loop_gain;
+    const LoopNumbers known(loop);
+    value["bandwidth_rad_s"] = known.bandwidth;
+    value["phase_margin_deg"] = known.margin;
+    value["loop_gain"] = known.gain;
     estimate["loops"][controller_name(loop.controller)] = value;
   }
   document.data.push_back(loops_table(study));

@@ -6,12 +6,15 @@
 #include <numbers>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/servo/axis/axis_model.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/servo/axis/sampled_axis.h"
 
 namespace alidade {
 namespace {
 
 using Complex = std::complex<double>;
+
+constexpr double half_power = 1.0 / std::numbers::sqrt2;
 
 Complex open_loop(const ServoPlant& plant, const PiGains& gains, double omega) {
   const Complex s(0.0, omega);
@@ -39,27 +42,93 @@ std::vector<Complex> poles_of(const ServoPlant& plant, const PiGains& gains) {
   return poles;
 }
 
-/// The highest frequency at which a size falls through a level; 0 where it never does.
-double falls_through(const std::function<double(double)>& size, double level) {
-  constexpr double lowest = 1e-4, highest = 1e6;
-  constexpr int steps = 2000;
-  const auto frequency = [](int i) { return lowest * std::pow(highest / lowest, static_cast<double>(i) / steps); };
-  for (int i = steps; i > 0; --i) {
-    if (!(size(frequency(i)) < level && size(frequency(i - 1)) >= level)) continue;
-    double low = frequency(i - 1), high = frequency(i);
-    for (int k = 0; k < 60; ++k) {
-      const double middle = std::sqrt(low * high);
-      (size(middle) < level ? high : low) = middle;
-    }
-    return low;
+/// Between two frequencies on different sides of a level.
+double where_it_passes(const std::function<double(double)>& size, double level, double low, double high) {
+  const bool falls = size(high) < level;
+  for (int k = 0; k < 60; ++k) {
+    const double middle = std::sqrt(low * high);
+    ((size(middle) < level) == falls ? high : low) = middle;
   }
+  return low;
+}
+
+/// Where a size falls through a level, at the highest frequency of `lowest` to `highest`; 0 where it never does.
+double falls_through(const std::function<double(double)>& size, double level, double lowest, double highest) {
+  constexpr int steps = 2000;
+  const auto frequency = [&](int i) { return lowest * std::pow(highest / lowest, static_cast<double>(i) / steps); };
+  for (int i = steps; i > 0; --i)
+    if (size(frequency(i)) < level && size(frequency(i - 1)) >= level)
+      return where_it_passes(size, level, frequency(i - 1), frequency(i));
   return 0.0;
 }
 
-/// State: angle, rate, integral, errors on their way (newest first).
-double sampled_radius(const ServoPlant& plant, const PiGains& gains, double period_s, int delay_samples) {
-  const AxisModel model = sampled(plant, period_s);
-  const Eigen::Index size = 3 + delay_samples;
+ContinuousLoop continuous_loop(const ServoPlant& plant, const PiGains& gains) {
+  constexpr double lowest = 1e-4, highest = 1e6;
+  ContinuousLoop result;
+  const auto L = [&](double omega) { return open_loop(plant, gains, omega); };
+  result.poles = poles_of(plant, gains);
+  result.bandwidth_rad_s =
+      falls_through([&](double w) { return std::abs(L(w) / (1.0 + L(w))); }, half_power, lowest, highest);
+  result.crossover_rad_s = falls_through([&](double w) { return std::abs(L(w)); }, 1.0, lowest, highest);
+  if (result.crossover_rad_s > 0.0)
+    result.phase_margin_deg = std::remainder(180.0 + std::arg(L(result.crossover_rad_s)) / degree, 360.0);
+  return result;
+}
+
+/// The loop at z = exp(jωT), its whole periods of delay apart: their phase goes round and round.
+class SampledLoop {
+ public:
+  SampledLoop(const SampledAxis& axis, const PiGains& gains, double period_s, int delay_samples)
+      : axis_(axis), gains_(gains), period_s_(period_s), delay_samples_(delay_samples) {}
+
+  [[nodiscard]] Complex without_delay(double omega) const {
+    const Complex z = std::polar(1.0, omega * period_s_);
+    return (gains_.kp + gains_.ki * period_s_ / (z - 1.0)) * axis_.response(z);
+  }
+  [[nodiscard]] double delay_phase(double omega) const { return -omega * period_s_ * delay_samples_; }
+  [[nodiscard]] Complex operator()(double omega) const {
+    return without_delay(omega) * std::polar(1.0, delay_phase(omega));
+  }
+
+ private:
+  SampledAxis axis_;
+  PiGains gains_;
+  double period_s_;
+  int delay_samples_;
+};
+
+/// Bandwidth, and the least phase margin of all crossovers; the phase is followed from low frequencies on, where it is
+/// between −360° and 0.
+void add_margins(const SampledLoop& loop, double period_s, LoopAnalysis& result) {
+  constexpr int steps = 2000;
+  const double lowest = 1e-7 / period_s, highest = std::numbers::pi / period_s;
+  const auto size = [&](double w) { return std::abs(loop.without_delay(w)); };
+  result.bandwidth_rad_s =
+      falls_through([&](double w) { return std::abs(loop(w) / (1.0 + loop(w))); }, half_power, lowest, highest);
+  double before = lowest, size_before = size(before), phase = std::arg(loop.without_delay(before));
+  if (phase > 1e-6) phase -= 2.0 * std::numbers::pi;
+  for (int i = 1; i <= steps; ++i) {
+    const double omega = lowest * std::pow(highest / lowest, static_cast<double>(i) / steps), size_now = size(omega);
+    if ((size_now < 1.0) != (size_before < 1.0)) {
+      const double crossover = where_it_passes(size, 1.0, before, omega);
+      const double turned = std::remainder(std::arg(loop.without_delay(crossover)) - phase, 2.0 * std::numbers::pi);
+      const double margin_deg = 180.0 + (phase + turned + loop.delay_phase(crossover)) / degree;
+      if (!(result.crossover_rad_s > 0.0) || margin_deg < result.phase_margin_deg) {
+        result.crossover_rad_s = crossover;
+        result.phase_margin_deg = margin_deg;
+      }
+    }
+    phase += std::remainder(std::arg(loop.without_delay(omega)) - phase, 2.0 * std::numbers::pi);
+    before = omega;
+    size_before = size_now;
+  }
+}
+
+/// State: angle, rate, lagged command, integral, last command, errors on their way (newest first). Of delays the sum
+/// counts alone.
+double sampled_radius(const SampledAxis& axis, const PiGains& gains, double period_s, int delay_samples) {
+  constexpr Eigen::Index integral = 3, last = 4, first_error = 5;
+  const Eigen::Index size = first_error + delay_samples;
   Eigen::MatrixXd next = Eigen::MatrixXd::Zero(size, size);
   Eigen::RowVectorXd error = Eigen::RowVectorXd::Zero(size);  // as the controller sees it
   if (delay_samples == 0)
@@ -67,13 +136,15 @@ double sampled_radius(const ServoPlant& plant, const PiGains& gains, double peri
   else
     error[size - 1] = 1.0;
   Eigen::RowVectorXd command = gains.kp * error;
-  command[2] += gains.ki;
-  next.topLeftCorner<2, 2>() = model.A;
-  next.topRows<2>() += model.B * command;
-  next.row(2) = period_s * error;
-  next(2, 2) += 1.0;
-  if (delay_samples > 0) next(3, 0) = -1.0;
-  for (Eigen::Index i = 4; i < size; ++i) next(i, i - 1) = 1.0;
+  command[integral] += gains.ki;
+  next.topLeftCorner<3, 3>() = axis.A;
+  next.topRows<3>() += axis.now * command;
+  next.topRows<3>().col(last) += axis.before;
+  next.row(integral) = period_s * error;
+  next(integral, integral) += 1.0;
+  next.row(last) = command;
+  if (delay_samples > 0) next(first_error, 0) = -1.0;
+  for (Eigen::Index i = first_error + 1; i < size; ++i) next(i, i - 1) = 1.0;
   return eigenvalues_of(next).cwiseAbs().maxCoeff();
 }
 
@@ -84,18 +155,20 @@ PiGains PiGains::per_rad(double focal_px) const {
   return {kp * units, ki * units, ErrorUnit::rad};
 }
 
-LoopAnalysis analysed(const ServoPlant& plant, const PiGains& per_rad, double period_s, int delay_samples) {
+LoopAnalysis analysed(const ServoAxis& axis, const PiGains& per_rad, double period_s, int delay_samples) {
   LoopAnalysis result;
-  const auto L = [&](double omega) { return open_loop(plant, per_rad, omega); };
-  result.poles = poles_of(plant, per_rad);
-  result.bandwidth_rad_s =
-      falls_through([&](double w) { return std::abs(L(w) / (1.0 + L(w))); }, 1.0 / std::numbers::sqrt2);
-  result.crossover_rad_s = falls_through([&](double w) { return std::abs(L(w)); }, 1.0);
-  if (result.crossover_rad_s > 0.0)
-    result.phase_margin_deg =
-        std::remainder(180.0 + std::arg(L(result.crossover_rad_s)) * 180.0 / std::numbers::pi, 360.0);
-  result.sampled_radius = sampled_radius(plant, per_rad, period_s, delay_samples);
+  const SampledAxis sampled = sampled_with_delay(axis, period_s);
+  const int all_samples = delay_samples + sampled.delay_samples;
+  result.continuous = continuous_loop(axis.plant, per_rad);
+  add_margins(SampledLoop(sampled, per_rad, period_s, all_samples), period_s, result);
+  result.sampled_radius = sampled_radius(sampled, per_rad, period_s, all_samples);
   return result;
+}
+
+LoopAnalysis analysed(const ServoPlant& plant, const PiGains& per_rad, double period_s, int delay_samples) {
+  ServoAxis axis;
+  axis.plant = plant;
+  return analysed(axis, per_rad, period_s, delay_samples);
 }
 
 }  // namespace alidade

@@ -23,21 +23,33 @@ struct PiGains {
   [[nodiscard]] PiGains per_rad(double focal_px) const;
 };
 
-/// A PI loop round a plant: L(s) = K (kp + ki/s) G(s), with K = error units per unit of the plant's output.
-struct LoopAnalysis {
-  std::vector<std::complex<double>> poles;  ///< Of the continuous closed loop, slowest last. [rad/s]
+/// A loop in continuous time, L(s) = K (kp + ki/s) G(s) with K = error units per unit of the plant's output: without
+/// hold, delays and second lag.
+struct ContinuousLoop {
+  std::vector<std::complex<double>> poles;  ///< Of the closed loop, slowest last. [rad/s]
   double bandwidth_rad_s = 0.0;             ///< Where the closed loop has fallen by 3 dB.
   double crossover_rad_s = 0.0;             ///< Where |L| = 1; 0: nowhere.
   double phase_margin_deg = 0.0;
-  /// Largest |eigenvalue| of the loop, sampled with zero-order hold: command u_k = kp e_k + ki Σ_{i<k} e_i T. Below 1:
-  /// stable.
+};
+
+/// A PI loop round a plant as it is sampled: command u_k = kp e_k + ki Σ_{i<k} e_i T, held for a period; errors and
+/// commands late, and the command behind its second lag. L(z) at z = exp(jωT), below half the sampling rate.
+struct LoopAnalysis {
+  double bandwidth_rad_s = 0.0;   ///< Where the closed loop has fallen by 3 dB; 0: nowhere.
+  double crossover_rad_s = 0.0;   ///< Where |L| = 1, nearest to instability; 0: nowhere.
+  double phase_margin_deg = 0.0;  ///< There; below 0: unstable.
+  /// Largest |eigenvalue| of the loop. Below 1: stable.
   double sampled_radius = 0.0;
+  ContinuousLoop continuous;
 
   [[nodiscard]] bool is_stable() const { return sampled_radius < 1.0; }
 };
 
-/// Analysis of a loop whose error is seen `delay_samples` late. Gains in rad (PiGains::per_rad), within a linear
-/// plant's limits.
+/// Analysis of a loop whose error is seen `delay_samples` late. Gains in rad (PiGains::per_rad), within the limits of
+/// rate and acceleration, without dead band, backlash and stops.
+[[nodiscard]] LoopAnalysis analysed(const ServoAxis& axis, const PiGains& per_rad, double period_s,
+                                    int delay_samples = 0);
+/// Of a plant without a delay of its commands.
 [[nodiscard]] LoopAnalysis analysed(const ServoPlant& plant, const PiGains& per_rad, double period_s,
                                     int delay_samples = 0);
 

@@ -112,6 +112,30 @@ TEST(ServoStability, EveryHeadsLensIsChecked) {
   }
 }
 
+/// Errors that arrive after an axis has come to rest by itself: 160 images late, an integral of 3/s has long run
+/// away.
+TEST(ServoStability, ALoopMayBeLaterThanItsAxisIsSlow) {
+  ServoScenario scenario;
+  scenario.controllers = {ControllerKind::pi};
+  scenario.scene.latency_s = 8.0;
+  for (ServoAxis& axis : scenario.scene.axes) axis.command_delay_s = 0.03;
+  EXPECT_GT(check_loops(scenario).front().analysis.sampled_radius, 1.0);
+}
+
+/// A tilt that is ten times as strong as the pan: the worse of both axes counts, and is named.
+TEST(ServoStability, BothAxesAreChecked) {
+  for (const ControllerKind kind : {ControllerKind::pi, ControllerKind::feedforward}) {
+    ServoScenario scenario;
+    scenario.controllers = {kind};
+    std::get<AnglePlant>(scenario.scene.axes[1].plant).gain *= 10.0;
+    const std::vector<LoopCheck> loops = check_loops(scenario);
+    EXPECT_GT(loops.front().analysis.sampled_radius, 1.0);
+    EXPECT_EQ(loops.front().axis, 1u);
+    const std::string sentence = servo_verdict(scenario, study_servo(scenario, 1)).sentence;
+    EXPECT_NE(sentence.find(" in tilt"), std::string::npos) << sentence;
+  }
+}
+
 /// An axis has room for 32 commands on their way; more of them would act early.
 TEST(ServoStability, CommandsThatAreTooLateAreRefusedByName) {
   ServoScenario scenario;

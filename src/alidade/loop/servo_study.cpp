@@ -16,6 +16,11 @@ double units_of_error_per_rad(ErrorUnit unit, double focal_px) { return PiGains{
 
 int samples_in(double delay_s, double period_s) { return static_cast<int>(std::ceil(delay_s / period_s - 1e-9)); }
 
+/// An image waits for the next period, a command does not. `pi` alone looks at images.
+int images_late(const ServoScene& scene, ControllerKind kind) {
+  return kind == ControllerKind::pi ? samples_in(scene.latency_s, scene.period_s) : 0;
+}
+
 /// The plant as it is read with its gain in the other unit.
 ServoPlant in_other_unit(const ServoPlant& plant) {
   ServoPlant other = plant;
@@ -27,12 +32,24 @@ AngleUnit unit_of(const ServoPlant& plant) {
   return std::visit([](const auto& p) { return p.unit; }, plant);
 }
 
-/// " of head 2", where there are heads with different lenses.
-std::string of_head(const ServoScenario& scenario, const LoopCheck& loop) {
+/// But for their stops, which no loop knows.
+bool axes_are_alike(const ServoScene& scene) {
+  ServoAxis tilt = scene.axes[1];
+  tilt.min_rad = scene.axes[0].min_rad;
+  tilt.max_rad = scene.axes[0].max_rad;
+  return tilt == scene.axes[0];
+}
+
+/// " of head 2", where there are heads with different lenses, and " in tilt" where the axes differ: of a loop that is
+/// not alike for all of them.
+std::string of_which(const ServoScenario& scenario, const LoopCheck& loop) {
+  if (loop.delay_samples < 0) return "";
   const std::vector<RigHead>& heads = scenario.scene.heads;
   const bool are_alike = std::ranges::all_of(
       heads, [&](const RigHead& head) { return focal_of(head.camera) == focal_of(heads[0].camera); });
-  return are_alike ? "" : " of head " + std::to_string(loop.head + 1);
+  std::string text = are_alike ? "" : " of head " + std::to_string(loop.head + 1);
+  if (!axes_are_alike(scenario.scene)) text += loop.axis == 0 ? " in pan" : " in tilt";
+  return text;
 }
 
 /// A loop that predicts where the target is from pixels that it takes by too short a lens.
@@ -51,27 +68,33 @@ Verdict restless(const ServoScenario& scenario, const LoopCheck& loop) {
 
 Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
   if (loop.analysis.is_stable()) return restless(scenario, loop);
-  const ServoPlant& plant = scenario.scene.axes[0].plant;
-  const double focal_px = focal_of(scenario.scene.heads[loop.head].camera);
-  const ServoPlant other = in_other_unit(plant);
+  const ServoScene& scene = scenario.scene;
+  const ServoPlant& plant = scene.axes[loop.axis].plant;
+  const double focal_px = focal_of(scene.heads[loop.head].camera);
+  ServoAxis other = scene.axes[loop.axis];
+  other.plant = in_other_unit(scaled(plant, scene.mismatch.gain, scene.mismatch.tau));
   const LoopAnalysis as_other =
-      analysed(other, scenario.config.pi.per_rad(focal_px), scenario.scene.period_s, std::max(0, loop.delay_samples));
+      analysed(other, scenario.config.pi.per_rad(focal_px), scene.period_s, images_late(scene, loop.controller));
   Verdict verdict;
   verdict.state = State::refused;
   verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = "the loop of " + std::string(controller_name(loop.controller)) + " sampled each " +
                      text_of(scenario.scene.period_s) + " s is unstable: spectral radius " +
-                     text_of(loop.analysis.sampled_radius, 4) + of_head(scenario, loop);
+                     text_of(loop.analysis.sampled_radius, 4) + of_which(scenario, loop);
   if (loop.delay_samples >= 0)
     verdict.sentence +=
         ", loop gain " + text_of(loop.loop_gain, 4) + " error units per " + std::string(unit_name(unit_of(plant)));
   verdict.to_add = loop.delay_samples < 0 ? "lower rate_gain_per_s, raise command_weight, or identify the plant again"
-                   : as_other.is_stable() ? "is the gain in " + std::string(unit_name(unit_of(other))) +
+                   : as_other.is_stable() ? "is the gain in " + std::string(unit_name(unit_of(other.plant))) +
                                                 "? then the radius is " + text_of(as_other.sampled_radius, 4)
                                           : "lower kp and ki, shorten the latency, or sample faster";
   verdict.checks.push_back(
       {"sampled loop", State::refused, verdict.sentence, loop.analysis.sampled_radius, 1.0, "1", ""});
   return verdict;
+}
+
+std::string margin_text(const LoopAnalysis& analysis) {
+  return analysis.crossover_rad_s > 0.0 ? ", phase margin " + text_of(analysis.phase_margin_deg) + " deg" : "";
 }
 
 const ServoComparison& best_of(const ServoStudy& study) {
@@ -102,7 +125,8 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
   for (const LoopCheck& loop : study.loops) {
     const double most = loop.delay_samples < 0 ? 0.995 : 0.98;  // one that was tried has a slow observer in it, too
     add("loop of " + std::string(controller_name(loop.controller)), loop.analysis.sampled_radius < most,
-        "spectral radius " + text_of(loop.analysis.sampled_radius, 4) + of_head(scenario, loop),
+        "spectral radius " + text_of(loop.analysis.sampled_radius, 4) + of_which(scenario, loop) +
+            margin_text(loop.analysis),
         loop.analysis.sampled_radius, most, "1");
   }
 }
@@ -151,34 +175,50 @@ double rest_px_of(const ServoScenario& scenario, ControllerKind kind) {
   return run_servo(scene, config, 1).figures.rms_px;
 }
 
-bool is_whole(double delay_s, double period_s) {
-  const double samples = delay_s / period_s;
-  return std::abs(samples - std::round(samples)) < 1e-9;
+bool is_linear_loop(const ServoScenario& scenario, ControllerKind kind) {
+  const bool are_angles = std::ranges::all_of(
+      scenario.scene.axes, [](const ServoAxis& axis) { return std::holds_alternative<AnglePlant>(axis.plant); });
+  return kind == ControllerKind::pi || (kind == ControllerKind::feedforward && are_angles);
 }
 
-/// Of one focal length; the lens becomes `largest` times as long, unknown to the loop.
-LoopCheck loop_of(const ServoScenario& scenario, ControllerKind kind, double focal_px, double largest) {
+/// Of one focal length and one axis; the lens becomes `largest` times as long, unknown to the loop.
+LoopCheck linear_loop_of(const ServoScenario& scenario, ControllerKind kind, std::size_t of_axis, double focal_px,
+                         double largest) {
   const ServoScene& scene = scenario.scene;
   const bool is_pi = kind == ControllerKind::pi;
-  const ServoAxis& axis = scene.axes[0];
+  ServoAxis axis = scene.axes[of_axis];
+  axis.plant = scaled(axis.plant, scene.mismatch.gain, scene.mismatch.tau);
   LoopCheck loop{kind, {}, 0.0, -1};
-  if (!is_pi && !(kind == ControllerKind::feedforward && std::holds_alternative<AnglePlant>(axis.plant))) {
-    loop.analysis.sampled_radius = settling_of(scenario, kind, focal_px);
-    return loop;
-  }
-  const ServoPlant plant = scaled(axis.plant, scene.mismatch.gain, scene.mismatch.tau);
-  // An image waits for the next period, a command does not.
-  const int late = is_pi ? samples_in(scene.latency_s, scene.period_s) : 0;
+  const int late = images_late(scene, kind);
   loop.delay_samples = late + samples_in(axis.command_delay_s, scene.period_s);
   const double factor = is_pi ? largest : 1.0;  // what corrects feedforward looks at the encoder
-  loop.loop_gain = units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant)) * factor;
+  loop.loop_gain = units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(axis.plant)) * factor;
   const PiGains gains = scenario.config.pi.per_rad(focal_px);
-  loop.analysis =
-      analysed(plant, {factor * gains.kp, factor * gains.ki, gains.unit}, scene.period_s, loop.delay_samples);
-  // The formula is for whole periods and a first-order plant.
-  if (!is_whole(axis.command_delay_s, scene.period_s) || axis.second_tau_s > 0.0)
-    loop.analysis.sampled_radius = settling_of(scenario, kind, focal_px);
+  loop.analysis = analysed(axis, {factor * gains.kp, factor * gains.ki, gains.unit}, scene.period_s, late);
+  loop.axis = of_axis;
   return loop;
+}
+
+/// Of all heads and both axes the loop nearest to instability.
+LoopCheck worst_loop_of(const ServoScenario& scenario, ControllerKind kind, double largest) {
+  const std::vector<RigHead>& heads = scenario.scene.heads;
+  LoopCheck worst{kind, {}, 0.0, -1};
+  if (!is_linear_loop(scenario, kind)) {
+    worst.analysis.sampled_radius = settling_of(scenario, kind, focal_of(heads[0].camera));
+    return worst;
+  }
+  std::vector<double> seen_px;
+  for (std::size_t head = 0; head < heads.size(); ++head) {
+    const double focal_px = focal_of(heads[head].camera);
+    if (std::ranges::count(seen_px, focal_px) > 0) continue;
+    seen_px.push_back(focal_px);
+    for (std::size_t axis = 0; axis < (axes_are_alike(scenario.scene) ? 1u : 2u); ++axis) {
+      LoopCheck loop = linear_loop_of(scenario, kind, axis, focal_px, largest);
+      loop.head = head;
+      if (loop.analysis.sampled_radius > worst.analysis.sampled_radius) worst = loop;
+    }
+  }
+  return worst;
 }
 
 }  // namespace
@@ -216,16 +256,7 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   // A lens that zooms while the loop keeps its old focal length is that much more gain.
   const double largest = scene.intrinsics == LensKnowledge::given ? scene.zoom.largest() : 1.0;
   for (const ControllerKind kind : scenario.controllers) {
-    LoopCheck worst{kind, {}, 0.0, -1};
-    for (std::size_t head = 0; head < scene.heads.size(); ++head) {
-      const double focal_px = focal_of(scene.heads[head].camera);
-      const bool is_known = std::any_of(scene.heads.begin(), scene.heads.begin() + static_cast<std::ptrdiff_t>(head),
-                                        [&](const RigHead& before) { return focal_of(before.camera) == focal_px; });
-      if (is_known) continue;
-      LoopCheck loop = loop_of(scenario, kind, focal_px, largest);
-      loop.head = head;
-      if (head == 0 || loop.analysis.sampled_radius > worst.analysis.sampled_radius) worst = loop;
-    }
+    LoopCheck worst = worst_loop_of(scenario, kind, largest);
     if (kind != ControllerKind::pi && largest > 1.0) worst.rest_px = rest_px_of(scenario, kind);
     loops.push_back(worst);
   }

@@ -21,18 +21,18 @@ struct LoopCheck {
   ControllerKind controller;
   LoopAnalysis analysis;
   double loop_gain = 0.0;  ///< Error units of the gains per unit of the plant's output.
-  int delay_samples = 0;   ///< −1: the controller was tried, and `sampled_radius` alone is known.
+  int delay_samples = 0;   ///< In whole periods; −1: the controller was tried, and `sampled_radius` alone is known.
   /// RMS about a target at rest, the lens at its longest, where the loop keeps to a shorter one; 0: not tried.
   double rest_px = 0.0;
   std::size_t head = 0;  ///< Of whose lens it is the loop: the one nearest to instability.
+  std::size_t axis = 0;  ///< Of which axis: 0 pan, 1 tilt.
 
   [[nodiscard]] bool is_stable() const;
 };
-/// Of `pi`, round plant and image; of `feedforward`, the correction round plant and encoder; of all others, of
-/// `feedforward` on a rate plant, and where a command is a part of a period late or the plant has a second lag, what
-/// the controller itself does to a small offset. Each with plant and delays as they are. What predicts the target from
-/// pixels that it takes by another lens is tried on a target at rest, too. Of several heads the one nearest to
-/// instability.
+/// Of `pi`, round plant and image; of `feedforward` on an angle plant, the correction round plant and encoder; of all
+/// others what the controller itself does to a small offset. Each with plant, lags and delays as they are. What
+/// predicts the target from pixels that it takes by another lens is tried on a target at rest, too. Of several heads
+/// and of both axes the one nearest to instability.
 [[nodiscard]] std::vector<LoopCheck> check_loops(const ServoScenario& scenario);
 
 struct ServoTrial {

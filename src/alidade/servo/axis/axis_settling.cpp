@@ -54,7 +54,11 @@ double settling_per_period(const ServoConfig& config, const ServoAxis& known, co
                            double latency_s) {
   constexpr double offset_rad = 1e-6;  // far from every limit of rate, also when it has grown a thousandfold
   constexpr double settled = 1e-4, grown = 1e3;
-  constexpr int window = 64, max_windows = 160;
+  constexpr int shortest = 64, num_periods = 10240;
+  // What is on its way shows itself one delay later, and what that does another one.
+  const double late_s = latency_s + std::max(known.command_delay_s, real.command_delay_s);
+  const int window = shortest + 2 * static_cast<int>(std::ceil(late_s / config.period_s));
+  const int max_windows = std::max(16, num_periods / window);
   SmallLoop loop(config, known, real, focal_px, latency_s, offset_rad);
   std::vector<double> sizes;
   for (int k = 0; k < max_windows; ++k) {

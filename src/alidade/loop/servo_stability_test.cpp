@@ -136,6 +136,35 @@ TEST(ServoStability, BothAxesAreChecked) {
   }
 }
 
+/// A plant as `identify` writes it, of which the acceleration makes pi a limit cycle: an independent simulation of the
+/// drive swings by 589 px about a target at rest with 120°/s², and rests with 240°/s².
+TEST(ServoStability, ALoopThatItsLimitsKeepSwingingIsNamed) {
+  constexpr double degree = 0.017453292519943295;
+  for (const bool swings : {true, false}) {
+    ServoScenario scenario;
+    scenario.controllers = {ControllerKind::pi};
+    scenario.scene.path.radius_m = 0.05;
+    scenario.scene.duration_s = 20.0;
+    scenario.num_seeds = 2;
+    scenario.robustness.reset();
+    for (ServoAxis& axis : scenario.scene.axes)
+      axis.plant = AnglePlant{.gain = 0.0567,
+                              .unit = AngleUnit::deg,
+                              .tau_s = 0.1,
+                              .max_rate_rad_s = 60.0 * degree,
+                              .max_acceleration_rad_s2 = (swings ? 120.0 : 240.0) * degree};
+    const ServoStudy alone = study_servo(scenario, 1);
+    EXPECT_LT(alone.loops.front().analysis.sampled_radius, 0.9);
+    EXPECT_EQ(alone.loops.front().swings(), swings) << alone.loops.front().swing_px;
+    const Verdict verdict = servo_verdict(scenario, alone);
+    EXPECT_EQ(verdict.state, swings ? State::bad : State::good) << verdict.sentence;
+    EXPECT_EQ(verdict.sentence.find("swings for good") != std::string::npos, swings) << verdict.sentence;
+    scenario.controllers = {ControllerKind::pi, ControllerKind::feedforward};
+    const Verdict beside = servo_verdict(scenario, study_servo(scenario, 1));
+    EXPECT_EQ(beside.state, swings ? State::care : State::good) << beside.sentence;
+  }
+}
+
 /// An axis has room for 32 commands on their way; more of them would act early.
 TEST(ServoStability, CommandsThatAreTooLateAreRefusedByName) {
   ServoScenario scenario;

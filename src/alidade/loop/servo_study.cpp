@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/loop/rest_trials.h"
 #include "alidade/servo/axis/axis_settling.h"
 #include "alidade/servo/head_servo.h"
 
@@ -97,6 +98,13 @@ std::string margin_text(const LoopAnalysis& analysis) {
   return analysis.crossover_rad_s > 0.0 ? ", phase margin " + text_of(analysis.phase_margin_deg) + " deg" : "";
 }
 
+/// The axes' limits make it a limit cycle.
+std::string swing_text(const LoopCheck& loop) {
+  return std::string(controller_name(loop.controller)) + " swings for good by " + text_of(loop.swing_px) +
+         " px RMS after a jump of the target, by the limits of rate and acceleration (" + text_of(loop.free_px) +
+         " px without them)";
+}
+
 const ServoComparison& best_of(const ServoStudy& study) {
   return *std::ranges::find(study.comparison, study.best, &ServoComparison::controller);
 }
@@ -124,6 +132,11 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
   }
   for (const LoopCheck& loop : study.loops) {
     const double most = loop.delay_samples < 0 ? 0.995 : 0.98;  // one that was tried has a slow observer in it, too
+    if (loop.swings()) {
+      add("loop of " + std::string(controller_name(loop.controller)), false, swing_text(loop), loop.swing_px,
+          loop.free_px, "px");
+      continue;
+    }
     add("loop of " + std::string(controller_name(loop.controller)), loop.analysis.sampled_radius < most,
         "spectral radius " + text_of(loop.analysis.sampled_radius, 4) + of_which(scenario, loop) +
             margin_text(loop.analysis),
@@ -154,25 +167,6 @@ double settling_of(const ServoScenario& scenario, ControllerKind kind, double fo
     slowest = std::max(slowest, settling_per_period(config, known, real, focal_px, scene.latency_s));
   }
   return slowest;
-}
-
-/// The loop itself, once its lens has become as long as it will, on a static target.
-double rest_px_of(const ServoScenario& scenario, ControllerKind kind) {
-  constexpr double zoom_from_s = 2.0, zoom_until_s = 3.0, min_s = 8.0, periods = 100.0;
-  ServoScene scene = scenario.scene;
-  scene.path = {};
-  scene.path.kind = PathKind::still;
-  scene.path.start_m = scenario.scene.path.start_m;
-  if (!scenario.scene.path.recorded_m.empty()) scene.path.start_m = scenario.scene.path.recorded_m.front();
-  scene.hidden_s.clear();
-  scene.zoom.t_s = {zoom_from_s, zoom_until_s};
-  scene.zoom.factor = {1.0, scenario.scene.zoom.largest()};
-  const double settle_s = std::max(min_s, periods * scene.period_s);
-  scene.warm_up_s = zoom_until_s + settle_s;
-  scene.duration_s = scene.warm_up_s + 0.5 * settle_s;
-  ServoConfig config = scenario.config;
-  config.controller = kind;
-  return run_servo(scene, config, 1).figures.rms_px;
 }
 
 bool is_linear_loop(const ServoScenario& scenario, ControllerKind kind) {
@@ -257,7 +251,12 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   const double largest = scene.intrinsics == LensKnowledge::given ? scene.zoom.largest() : 1.0;
   for (const ControllerKind kind : scenario.controllers) {
     LoopCheck worst = worst_loop_of(scenario, kind, largest);
-    if (kind != ControllerKind::pi && largest > 1.0) worst.rest_px = rest_px_of(scenario, kind);
+    if (kind != ControllerKind::pi && largest > 1.0) worst.rest_px = zoomed_rest_px(scenario, kind);
+    if (worst.is_stable() && has_limits(scene)) {
+      const Swing swing = swing_after_a_jump(scenario, kind);
+      if (swing.is_for_good()) worst.swing_px = swing.rms_px;
+      worst.free_px = swing.free_px;
+    }
     loops.push_back(worst);
   }
   return loops;
@@ -315,6 +314,12 @@ Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {
   if (best.in_image < 0.5) {
     verdict.state = State::bad;
     verdict.sentence += "; in the image " + text_of(100.0 * best.in_image) + " % of the time only";
+    return verdict;
+  }
+  const auto own = std::ranges::find(study.loops, study.best, &LoopCheck::controller);
+  if (own != study.loops.end() && own->swings() && best.rms_px > scenario.specification_px) {
+    verdict.state = State::bad;
+    verdict.sentence += "; " + swing_text(*own);
     return verdict;
   }
   for (const Check& check : verdict.checks) {

@@ -24,10 +24,15 @@ struct LoopCheck {
   int delay_samples = 0;   ///< In whole periods; −1: the controller was tried, and `sampled_radius` alone is known.
   /// RMS about a target at rest, the lens at its longest, where the loop keeps to a shorter one; 0: not tried.
   double rest_px = 0.0;
+  /// RMS that is left long after the target has jumped by a quarter of the image and rests, where the limits of rate
+  /// and acceleration keep the loop from rest; 0: it comes to rest, or has no limits.
+  double swing_px = 0.0;
+  double free_px = 0.0;  ///< The same without those limits.
   std::size_t head = 0;  ///< Of whose lens it is the loop: the one nearest to instability.
   std::size_t axis = 0;  ///< Of which axis: 0 pan, 1 tilt.
 
   [[nodiscard]] bool is_stable() const;
+  [[nodiscard]] bool swings() const { return swing_px > 0.0; }
 };
 /// Of `pi`, round plant and image; of `feedforward` on an angle plant, the correction round plant and encoder; of all
 /// others what the controller itself does to a small offset. Each with plant, lags and delays as they are. What

@@ -194,6 +194,7 @@ void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDo
     value["bandwidth_rad_s"] = known.bandwidth;
     value["phase_margin_deg"] = known.margin;
     value["loop_gain"] = known.gain;
+    value["swing_px"] = loop.swing_px;
     estimate["loops"][controller_name(loop.controller)] = value;
   }
   document.data.push_back(loops_table(study));

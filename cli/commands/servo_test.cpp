@@ -38,6 +38,9 @@ TEST_F(ServoCommand, GivesTheNamesOfTheContract) {
     EXPECT_EQ(figures["central_third"], 1.0) << name;
   }
   EXPECT_LT(document["estimate"]["loops"]["pi"]["sampled_radius"], 1.0);
+  EXPECT_GT(document["estimate"]["loops"]["pi"]["phase_margin_deg"], 90.0);
+  for (const std::string name : {"bandwidth_rad_s", "phase_margin_deg", "loop_gain"})
+    EXPECT_TRUE(document["estimate"]["loops"]["lqr"][name].is_null()) << name;  // it is tried
   const Json& control = document["data"]["control"];
   for (const std::string name :
        {"t_s", "head", "asked_pan_rad", "measured_tilt_rad", "predicted_pan_rad", "rate_pan_rad_s", "error_u_px"})

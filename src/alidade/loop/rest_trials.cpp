@@ -33,8 +33,7 @@ Eigen::Vector3d jump_of(const ServoScene& scene) {
     if (!readings) continue;
     const double aside_px = of_image * std::min(head.camera.width_px, head.camera.height_px);
     const auto centre = ray_in_world(head, *readings, centre_of(head.camera));
-    const auto ray =
-        ray_in_world(head, *readings, centre_of(head.camera) + Eigen::Vector2d::Constant(aside_px));
+    const auto ray = ray_in_world(head, *readings, centre_of(head.camera) + Eigen::Vector2d::Constant(aside_px));
     if (!centre || !ray) continue;
     const double range_m = (scene.path.start_m - centre->origin_in_world).norm();
     const Eigen::Vector3d jump = range_m * (ray->direction_in_world - centre->direction_in_world);

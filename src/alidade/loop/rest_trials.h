@@ -7,8 +7,8 @@ namespace alidade {
 /// RMS about a target at rest once the lens has become as long as it will, unknown to the loop. [px]
 [[nodiscard]] double zoomed_rest_px(const ServoScenario& scenario, ControllerKind kind);
 
-/// A loop whose target has jumped by a quarter of the image and rests: how far from it a head is long after, as the axes
-/// are and without their limits of rate and acceleration. Of the head that swings most.
+/// A loop whose target has jumped by a quarter of the image and rests: how far from it a head is long after, as the
+/// axes are and without their limits of rate and acceleration. Of the head that swings most.
 struct Swing {
   double rms_px = 0.0, before_px = 0.0;  ///< In the last part of the time, and in the part before that.
   double free_px = 0.0;                  ///< Without limits.

@@ -177,7 +177,7 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
   ServoFigures figures;
   std::vector<double> errors;
   double sum2 = 0.0;
-  std::size_t central = 0, visible = 0;
+  std::size_t central = 0, visible = 0, waiting = 0;
   for (const ServoRow& row : rows) {
     figures.num_lost += row.event == ServoEvent::lost ? 1u : 0u;
     figures.num_found += row.event == ServoEvent::found ? 1u : 0u;
@@ -190,6 +190,7 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
     errors.push_back(error);
     sum2 += error * error;
     visible += row.is_in_image ? 1u : 0u;
+    waiting += row.event == ServoEvent::waiting ? 1u : 0u;
     central +=
         std::abs(row.error_px.x()) <= camera.width_px / 6.0 && std::abs(row.error_px.y()) <= camera.height_px / 6.0
             ? 1u
@@ -200,6 +201,7 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
   figures.rms_px = std::sqrt(sum2 / count);
   figures.central_third = static_cast<double>(central) / count;
   figures.in_image = static_cast<double>(visible) / count;
+  figures.unseen = static_cast<double>(waiting) / count;
   std::ranges::sort(errors);
   figures.p95_px = errors[static_cast<std::size_t>(0.95 * (count - 1.0))];
   figures.max_px = errors.back();
@@ -252,7 +254,7 @@ ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint
 ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   ServoFigures all;
   if (runs.empty()) return all;
-  std::vector<double> maxima, p95;
+  std::vector<double> p95;
   for (const ServoFigures& run : runs) {
     all.rms_px += run.rms_px * run.rms_px;
     all.central_third += run.central_third;
@@ -262,7 +264,8 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
     all.search_s += run.search_s;
     all.focal_share += run.focal_share * run.focal_share;
     all.focal_z += run.focal_z * run.focal_z;
-    maxima.push_back(run.max_px);
+    all.unseen += run.unseen;
+    all.max_px = std::max(all.max_px, run.max_px);
     p95.push_back(run.p95_px);
   }
   const auto count = static_cast<double>(runs.size());
@@ -271,9 +274,8 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   all.focal_z = std::sqrt(all.focal_z / count);
   all.central_third /= count;
   all.in_image /= count;
-  std::ranges::sort(maxima);
+  all.unseen /= count;
   std::ranges::sort(p95);
-  all.max_px = maxima[maxima.size() / 2];
   all.p95_px = p95[p95.size() / 2];
   return all;
 }

@@ -78,6 +78,7 @@ struct ServoFigures {
   std::size_t num_lost = 0;    ///< How often a target that had been followed was lost…
   std::size_t num_found = 0;   ///< …and found again.
   double search_s = 0.0;       ///< Time spent searching, all heads.
+  double unseen = 0.0;         ///< Share of the time in which a head has not yet seen the target.
   double focal_share = 0.0;    ///< RMS error of fx as the loop has it, over the true one.
   double focal_z = 0.0;        ///< The same over its σ; 0 where it states none.
 };
@@ -92,7 +93,7 @@ struct ServoRun {
 [[nodiscard]] ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed,
                                  const std::function<void(const ServoRow&)>& watch = {});
 
-/// RMS of all runs, median of the runs' maxima, means of the shares, sums of the counts.
+/// RMS of all runs, the largest of the runs' maxima, median of their 95 %, means of the shares, sums of the counts.
 [[nodiscard]] ServoFigures put_together(const std::vector<ServoFigures>& runs);
 
 /// RMS over factors on gain and time constant, gain by gain: rms_px[gain · num_tau + tau].

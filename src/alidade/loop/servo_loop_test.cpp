@@ -205,6 +205,37 @@ TEST(ServoStudy, RefusesTheRadianReadingBeforeItRuns) {
   EXPECT_NE(verdict.to_add.find("deg"), std::string::npos) << verdict.to_add;
 }
 
+/// Heads that never see the target stand where the simulation put them: their figures are nobody's.
+TEST(ServoStudy, ATargetThatIsNeverSeenIsNotFollowed) {
+  ServoScenario scenario;
+  scenario.controllers = {ControllerKind::pi, ControllerKind::lqr};
+  scenario.scene.path.kind = PathKind::still;
+  scenario.num_seeds = 1;
+  scenario.robustness.reset();
+  scenario.scene.hidden_s = {{0.0, 12.1}};
+  const ServoStudy never = study_servo(scenario, 1);
+  const Verdict verdict = servo_verdict(scenario, never);
+  EXPECT_EQ(verdict.state, State::bad);
+  EXPECT_NE(verdict.sentence.find("no head ever sees the target"), std::string::npos) << verdict.sentence;
+  scenario.scene.hidden_s = {{0.0, 7.0}};  // half of the time that counts
+  const ServoStudy late = study_servo(scenario, 1);
+  EXPECT_NEAR(late.comparison.front().figures.unseen, 0.5, 0.01);
+  EXPECT_EQ(servo_verdict(scenario, late).state, State::care);
+  scenario.scene.hidden_s.clear();
+  EXPECT_EQ(study_servo(scenario, 1).comparison.front().figures.unseen, 0.0);
+}
+
+TEST(ServoStudy, TheFarthestIsThatOfAllTrials) {
+  ServoScenario scenario;
+  scenario.controllers = {ControllerKind::lqr};
+  scenario.num_seeds = 5;
+  scenario.robustness.reset();
+  const ServoStudy study = study_servo(scenario, 1);
+  double most_px = 0.0;
+  for (const ServoTrial& trial : study.trials) most_px = std::max(most_px, trial.figures.max_px);
+  EXPECT_EQ(study.comparison.front().figures.max_px, most_px);
+}
+
 TEST(ServoStudy, ComparesOverTheSameSeeds) {
   ServoScenario scenario;
   scenario.num_seeds = 3;

@@ -120,6 +120,9 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
       best.rms_px, asked, "px");
   add("in the image", best.in_image >= 1.0, text_of(100.0 * best.in_image) + " % of the time in the image",
       best.in_image, 1.0, "1");
+  if (best.unseen > 0.0)
+    add("seen", false, text_of(100.0 * best.unseen) + " % of the time a head has not seen the target yet", best.unseen,
+        0.0, "1");
   if (best.num_lost > 0)
     add("lost", false,
         "lost " + std::to_string(best.num_lost) + " times, found again " + std::to_string(best.num_found) + " times",
@@ -311,6 +314,11 @@ Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {
   const auto pi = std::ranges::find(study.comparison, ControllerKind::pi, &ServoComparison::controller);
   if (pi != study.comparison.end() && study.best != ControllerKind::pi)
     verdict.sentence += ", pi within " + text_of(pi->figures.rms_px) + " px";
+  if (best.unseen >= 1.0) {
+    verdict.state = State::bad;
+    verdict.sentence = "no head ever sees the target: the figures are those of heads that nothing moves";
+    return verdict;
+  }
   if (best.in_image < 0.5) {
     verdict.state = State::bad;
     verdict.sentence += "; in the image " + text_of(100.0 * best.in_image) + " % of the time only";

@@ -84,13 +84,14 @@ servo.yaml  text  the plant, as a scenario of `alidade servo` takes it
                                 {"servo", R"(estimate:
 controllers.*.
   rms_px         px     of the target from the image's centre
-  p95_px         px     95 % are nearer
-  max_px         px     the farthest
+  p95_px         px     95 % are nearer, median of the trials
+  max_px         px     the farthest of all trials
   central_third  1      share of the time in the central third
   in_picture     1      share of the time in the image
   lost           count  trials that lost the target
   found          count  trials that found it again
-  search_s       s      mean time of search
+  search_s       s      time of search
+  unseen         1      share of the time in which a head has not seen the target yet
 loops.*.
   sampled_radius    1      largest eigenvalue of the sampled loop; below 1: stable
   bandwidth_rad_s   rad/s  of the sampled loop with its delays; null: the controller was tried

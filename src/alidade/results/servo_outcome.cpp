@@ -57,6 +57,7 @@ JsonValue figures_value(const ServoFigures& figures) {
   value["lost"] = figures.num_lost;
   value["found"] = figures.num_found;
   value["search_s"] = figures.search_s;
+  value["unseen"] = figures.unseen;
   return value;
 }
 

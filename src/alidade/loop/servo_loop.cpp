@@ -118,6 +118,23 @@ void deliver(const ServoScene& scene, LoopedHead& looped, double t_s, HeadServoI
   }
 }
 
+/// Behind the camera: as wrong as can be, half a turn of pixels.
+double length_of(const std::optional<Eigen::Vector2d>& error_px, double focal_px) {
+  const double most = 3.14 * focal_px;
+  return error_px && error_px->allFinite() ? std::min(most, error_px->norm()) : most;
+}
+
+/// Between this image and the next.
+void add_between(const ServoScene& scene, const LoopedHead& looped, ServoRow& row) {
+  const auto parts = static_cast<double>(row.error_between_px.size() + 1);
+  for (std::size_t i = 0; i < row.error_between_px.size(); ++i) {
+    const double later_s = static_cast<double>(i + 1) / parts * scene.period_s;
+    auto where = looped.head.true_pixel_after(later_s, scene.path.at(row.t_s + later_s));
+    if (where) *where -= row.true_lens.tail<2>();
+    row.error_between_px[i] = length_of(where, row.true_lens[0]);
+  }
+}
+
 /// Where the target truly is in the row's image.
 void add_truth(const ServoScene& scene, const LoopedHead& looped, const Eigen::Vector3d& target, ServoRow& row) {
   const auto where = looped.head.true_pixel(target);
@@ -154,6 +171,7 @@ ServoRow step(const ServoScene& scene, LoopedHead& looped, double t_s, std::size
   row.rate_rad_s = looped.head.rates_rad_s();
   row.event = output.event;
   add_truth(scene, looped, target, row);
+  add_between(scene, looped, row);
   if (is_seen) row.seen_px = *seen;
   return row;
 }
@@ -176,7 +194,7 @@ void add_focal_errors(const ServoScene& scene, const std::vector<ServoRow>& rows
 ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& rows) {
   ServoFigures figures;
   std::vector<double> errors;
-  double sum2 = 0.0;
+  double sum2 = 0.0, between2 = 0.0;
   std::size_t central = 0, visible = 0, waiting = 0;
   for (const ServoRow& row : rows) {
     figures.num_lost += row.event == ServoEvent::lost ? 1u : 0u;
@@ -184,11 +202,13 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
     if (row.event == ServoEvent::lost || row.event == ServoEvent::searching) figures.search_s += scene.period_s;
     if (row.t_s < scene.warm_up_s) continue;
     const Camera& camera = scene.heads[row.head].camera;
-    // Behind the camera: as wrong as can be, half a turn of pixels.
-    const double most = 3.14 * row.true_lens[0];
-    const double error = row.error_px.allFinite() ? std::min(most, row.error_px.norm()) : most;
+    const double error = length_of(row.error_px, row.true_lens[0]);
     errors.push_back(error);
     sum2 += error * error;
+    for (const double between_px : row.error_between_px) {
+      between2 += between_px * between_px / static_cast<double>(row.error_between_px.size());
+      figures.max_px = std::max(figures.max_px, between_px);
+    }
     visible += row.is_in_image ? 1u : 0u;
     waiting += row.event == ServoEvent::waiting ? 1u : 0u;
     central +=
@@ -199,12 +219,13 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
   if (errors.empty()) return figures;
   const auto count = static_cast<double>(errors.size());
   figures.rms_px = std::sqrt(sum2 / count);
+  figures.between_px = std::sqrt(between2 / count);
   figures.central_third = static_cast<double>(central) / count;
   figures.in_image = static_cast<double>(visible) / count;
   figures.unseen = static_cast<double>(waiting) / count;
   std::ranges::sort(errors);
   figures.p95_px = errors[static_cast<std::size_t>(0.95 * (count - 1.0))];
-  figures.max_px = errors.back();
+  figures.max_px = std::max(figures.max_px, errors.back());
   add_focal_errors(scene, rows, figures);
   return figures;
 }
@@ -257,6 +278,7 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   std::vector<double> p95;
   for (const ServoFigures& run : runs) {
     all.rms_px += run.rms_px * run.rms_px;
+    all.between_px += run.between_px * run.between_px;
     all.central_third += run.central_third;
     all.in_image += run.in_image;
     all.num_lost += run.num_lost;
@@ -270,6 +292,7 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   }
   const auto count = static_cast<double>(runs.size());
   all.rms_px = std::sqrt(all.rms_px / count);
+  all.between_px = std::sqrt(all.between_px / count);
   all.focal_share = std::sqrt(all.focal_share / count);
   all.focal_z = std::sqrt(all.focal_z / count);
   all.central_third /= count;

@@ -61,6 +61,8 @@ struct ServoRow {
   Eigen::Vector2d command, asked_rad, measured_rad, predicted_rad, rate_rad_s, sigma_predicted_px;
   bool has_prediction = false;
   Eigen::Vector2d error_px;  ///< True image of the target − centre of the image; NaN behind the camera.
+  /// Its length at a third and at two thirds of the period that follows; as in figures behind the camera.
+  std::array<double, 2> error_between_px{};
   bool is_in_image = false;
   std::optional<Eigen::Vector2d> seen_px;  ///< Where the head saw the target, with its noise.
   ServoEvent event = ServoEvent::none;
@@ -68,9 +70,11 @@ struct ServoRow {
   Eigen::Vector4d true_lens = Eigen::Vector4d::Zero();  ///< fx, fy, cx, cy. [px]
 };
 
-/// Figures of one run, or of several put together. Errors are distances |(u, v) − centre| at the periods, all heads.
+/// Figures of one run, or of several put together. Errors are distances |(u, v) − centre| at the periods, all heads;
+/// `between_px` and `max_px` at thirds of them, too.
 struct ServoFigures {
   double rms_px = 0.0;
+  double between_px = 0.0;  ///< RMS at thirds of the periods, where the target is between two images.
   double p95_px = 0.0;
   double max_px = 0.0;
   double central_third = 0.0;  ///< Share within the central third in both directions.

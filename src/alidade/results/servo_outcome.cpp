@@ -50,6 +50,7 @@ std::array<double, num_columns> cells_of(const ServoRow& row) {
 JsonValue figures_value(const ServoFigures& figures) {
   JsonValue value = JsonValue::object();
   value["rms_px"] = figures.rms_px;
+  value["between_px"] = figures.between_px;
   value["p95_px"] = figures.p95_px;
   value["max_px"] = figures.max_px;
   value["central_third"] = figures.central_third;

@@ -170,10 +170,22 @@ Eigen::Vector2d SimulatedHead::read_encoders() {
   return {rounded_to(noisy.x(), truth_.encoder_step_rad), rounded_to(noisy.y(), truth_.encoder_step_rad)};
 }
 
-std::optional<Eigen::Vector2d> SimulatedHead::true_pixel(const Eigen::Vector3d& target_in_world) const {
-  const auto seen = project(truth_.head, angles_rad(), target_in_world);
+std::optional<Eigen::Vector2d> SimulatedHead::pixel_at(const Eigen::Vector2d& angles_rad,
+                                                       const Eigen::Vector3d& target_in_world) const {
+  const auto seen = project(truth_.head, angles_rad, target_in_world);
   if (!seen) return std::nullopt;
   return Zoomed(truth_.head.camera, intrinsics_).px(seen->px);
+}
+
+std::optional<Eigen::Vector2d> SimulatedHead::true_pixel(const Eigen::Vector3d& target_in_world) const {
+  return pixel_at(angles_rad(), target_in_world);
+}
+
+std::optional<Eigen::Vector2d> SimulatedHead::true_pixel_after(double dt_s,
+                                                               const Eigen::Vector3d& target_in_world) const {
+  std::array<DelayedAxis, 2> then = axes_;
+  for (DelayedAxis& axis : then) axis.advance(dt_s);
+  return pixel_at({then[0].motion().angle_rad, then[1].motion().angle_rad}, target_in_world);
 }
 
 std::vector<Eigen::Vector2d> SimulatedHead::seen_background() {

@@ -35,7 +35,10 @@ class SimulatedHead {
   [[nodiscard]] Eigen::Vector2d read_encoders();
   /// Where the target is in the image taken now: without noise, anywhere in front of the camera.
   [[nodiscard]] std::optional<Eigen::Vector2d> true_pixel(const Eigen::Vector3d& target_in_world) const;
-  /// The same with noise, where it is within the image.
+  /// The same dt ≥ 0 later, under the commands that were sent; the head itself stays.
+  [[nodiscard]] std::optional<Eigen::Vector2d> true_pixel_after(double dt_s,
+                                                                const Eigen::Vector3d& target_in_world) const;
+  /// The same as `true_pixel` with noise, where it is within the image.
   [[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const Eigen::Vector3d& target_in_world);
   /// Where the background is in that image, with noise; NaN: not in it.
   [[nodiscard]] std::vector<Eigen::Vector2d> seen_background();
@@ -47,6 +50,9 @@ class SimulatedHead {
   [[nodiscard]] Eigen::Vector2d rates_rad_s() const;
 
  private:
+  [[nodiscard]] std::optional<Eigen::Vector2d> pixel_at(const Eigen::Vector2d& angles_rad,
+                                                        const Eigen::Vector3d& target_in_world) const;
+
   HeadTruth truth_;
   std::array<DelayedAxis, 2> axes_;
   Draws draws_, background_draws_;

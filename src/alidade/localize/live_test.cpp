@@ -65,7 +65,7 @@ TEST(Live, VagueDepthsLeaveTheFrameToTheTarget) {
   LocalizeConfig config;
   config.depth_m = 0.75;
   config.sigma_depth = 0.3;
-  const int num_runs = testing::trials(3);
+  const int num_runs = testing::trials(2);
   double nees = 0.0;
   for (int run = 1; run <= num_runs; ++run)
     nees += live_nees(scene, static_cast<std::uint64_t>(run), config) / num_runs;
@@ -83,7 +83,7 @@ TEST(Live, KnownPointsThatComeBackAreNoNews) {
   testing::Hover scene;
   scene.num_frames = 500;
   scene.num_others = num_known;
-  const int num_runs = testing::trials(3);
+  const int num_runs = testing::trials(2);
   double nees = 0.0;
   for (int run = 1; run <= num_runs; ++run) {
     const testing::HoverRun film = testing::hovering(scene, static_cast<std::uint64_t>(run));

@@ -67,7 +67,7 @@ ObserveSetup config_of(ObserveMethod method) {
 /// 0.1 to 1°: the points and the camera of each part were found anew, with a mounting that was not the told one (up to
 /// 44σ off, one of eight at a good verdict).
 TEST(MountingStep, IsNamedWithItsTime) {
-  const int sets = testing::trials(2);
+  const int sets = testing::trials(1);
   for (const ObserveMethod method : {ObserveMethod::hybrid, ObserveMethod::batch}) {
     int named = 0, beyond = 0;
     for (int seed = 1; seed <= sets; ++seed) {
@@ -132,7 +132,7 @@ TEST(MountingStep, IsNotTakenForADelayOfAShortLog) {
 
 /// Neither a mounting that is askew from the beginning nor a clean log has one.
 TEST(MountingStep, IsNotThereWhereTheMountingStays) {
-  const int sets = testing::trials(2);
+  const int sets = testing::trials(1);
   for (const bool is_askew : {false, true}) {
     int named = 0, good = 0;
     for (int seed = 1; seed <= sets; ++seed) {

@@ -18,8 +18,8 @@ namespace causes_of_observe {
 
 constexpr int image_width = 1280, image_height = 720;
 
-/// Draws of each cause: 3, or as many as ALIDADE_TEST_TRIALS says.
-const int sets = testing::trials(3);
+/// Draws of each cause: 2, or as many as ALIDADE_TEST_TRIALS says.
+const int sets = testing::trials(2);
 
 /// All but one in ten.
 int nearly_all() { return sets - sets / 10; }

@@ -161,7 +161,7 @@ TEST(ObserveSigma, ATrackersErrorsAreNoCause) {
     }
   };
   int named = 0;
-  const int sets = testing::trials(6);
+  const int sets = testing::trials(4);
   for (int set = 1; set <= sets; ++set) {
     const RotationLog log = log_of(scenario, static_cast<std::uint64_t>(set));
     const ObserveSetup config = config_of(ObserveMethod::batch);
@@ -282,7 +282,7 @@ const std::vector<Cause>& causes() {
 TEST(ObserveSigma, NoCauseIsSilent) {
   for (const Cause& cause : causes()) {
     int silent = 0, named = 0;
-    const int sets = testing::trials(2);
+    const int sets = testing::trials(1);
     for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(sets); ++seed) {
       Scenario scenario;
       scenario.num_points = 10;
@@ -321,7 +321,7 @@ TEST(ObserveSigma, NoCauseIsSilentBesideNoisyRotations) {
   config.sigma_angle_rad = sigma_rad;
   std::vector<Cause> with_none = causes();
   with_none.push_back({.name = "none"});
-  const int sets = testing::trials(2);
+  const int sets = testing::trials(1);
   for (const Cause& cause : with_none) {
     int silent = 0, good = 0;
     for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(sets); ++seed) {

@@ -112,7 +112,7 @@ std::size_t num_beyond(const std::vector<double>& errors, double limit) {
 /// The first frame of a zoom fits neither the camera until then nor, for sure, another: its row had the old focal
 /// length with the old σ, up to 400 σ off.
 TEST(ZoomingLog, HasRowsWithinTheirSigma) {
-  for (int seed = 1; seed <= testing::trials(2); ++seed) {
+  for (int seed = 1; seed <= testing::trials(1); ++seed) {
     Draws draws(static_cast<std::uint64_t>(seed));
     const Zooms zooms = draw_zooms(draws, 0.0);
     const RotationLog log = log_of(zooms, static_cast<std::uint64_t>(seed));
@@ -129,7 +129,7 @@ TEST(ZoomingLog, HasRowsWithinTheirSigma) {
 /// Wrong pixels in every frame, of one point in 25: a zoom's frames fitted no camera, nor did the rows before the zoom
 /// fit the one after it, from which their adjustment began.
 TEST(ZoomingLog, IsFollowedAmongWrongPixels) {
-  for (int seed = 1; seed <= testing::trials(2); ++seed) {
+  for (int seed = 1; seed <= testing::trials(1); ++seed) {
     Draws draws(static_cast<std::uint64_t>(seed));
     const Zooms zooms = draw_zooms(draws, 0.0);
     RotationLog log = log_of(zooms, static_cast<std::uint64_t>(seed));
@@ -146,7 +146,7 @@ TEST(ZoomingLog, IsFollowedAmongWrongPixels) {
 /// A zoom of 1 % is noticed late: its first frames were of the time that all rows are adjusted of, and the log was
 /// called one whose focal length never rests.
 TEST(ZoomingLog, OfAHundredthIsFollowed) {
-  for (int seed = 1; seed <= testing::trials(2); ++seed) {
+  for (int seed = 1; seed <= testing::trials(1); ++seed) {
     Draws draws(40 + static_cast<std::uint64_t>(seed));
     Zooms zooms = draw_zooms(draws, 0.0);
     zooms.factor[0] = 1.01;
@@ -161,7 +161,7 @@ TEST(ZoomingLog, OfAHundredthIsFollowed) {
 /// A zoom of 0.4 % in 1.5 s is noticed after half a second: until then its frames moved the points and the centre,
 /// which stayed up to 8 σ off to the end, silently, and its rows were up to 26 σ off.
 TEST(ZoomingLog, OfAFewThousandthsLeavesNothingBehind) {
-  for (int seed = 3; seed < 3 + testing::trials(2); ++seed) {
+  for (int seed = 3; seed < 3 + testing::trials(1); ++seed) {
     Draws draws(static_cast<std::uint64_t>(seed));
     Zooms zooms = draw_zooms(draws, 0.0);
     zooms.factor[1] = 0.996;
@@ -178,7 +178,7 @@ TEST(ZoomingLog, OfAFewThousandthsLeavesNothingBehind) {
 /// A focal length that sways by 0.3 % all the time is an error that the pixels of a time share. The last row's σ had
 /// it, the others' did not: most were beyond 5 σ.
 TEST(ZoomingLog, HasRowsWithTheSharedErrorsOfTheLast) {
-  for (int seed = 1; seed <= testing::trials(2); ++seed) {
+  for (int seed = 1; seed <= testing::trials(1); ++seed) {
     Draws draws(static_cast<std::uint64_t>(seed));
     const Zooms zooms = draw_zooms(draws, 0.003);
     const RotationLog log = log_of(zooms, static_cast<std::uint64_t>(seed));
@@ -193,7 +193,7 @@ TEST(ZoomingLog, HasRowsWithTheSharedErrorsOfTheLast) {
 
 /// A bump of 0.3° while the lens is at rest between zooms was followed as a zoom, with cx and cy up to 170 σ off.
 TEST(ZoomingLog, SaysThatMoreThanTheLensHasChanged) {
-  for (int seed = 1; seed <= testing::trials(3); ++seed) {
+  for (int seed = 1; seed <= testing::trials(2); ++seed) {
     Draws draws(static_cast<std::uint64_t>(seed));
     const Zooms zooms = draw_zooms(draws, 0.0);
     RotationLog log = log_of(zooms, static_cast<std::uint64_t>(seed));
@@ -207,7 +207,7 @@ TEST(ZoomingLog, SaysThatMoreThanTheLensHasChanged) {
 /// Distortion that grows with the zoom: the filter took it for the longest rest's at every zoom, up to 20 σ off, in two
 /// of ten logs silently. Each rest has its own now.
 TEST(ZoomingLog, HasTheDistortionOfEachZoom) {
-  for (int seed = 1; seed <= testing::trials(3); ++seed) {
+  for (int seed = 1; seed <= testing::trials(2); ++seed) {
     Draws draws(static_cast<std::uint64_t>(seed));
     const Zooms zooms = draw_zooms(draws, 0.0);
     RotationLog log = log_of(zooms, static_cast<std::uint64_t>(seed));

@@ -12,7 +12,7 @@ namespace {
 using namespace testing;
 using SigmaMethod = RangefinderMethod;
 
-int num_trials() { return trials(150); }
+int num_trials() { return trials(80); }
 
 /// What of the world is not as the model says.
 struct Deviation {

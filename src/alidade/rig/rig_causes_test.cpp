@@ -23,7 +23,7 @@ using testing::rig_trial;
 using testing::RigTrial;
 using testing::RigTrialSetup;
 
-int num_rigs() { return std::min(100, testing::trials(4)); }
+int num_rigs() { return std::min(100, testing::trials(3)); }
 
 struct RigFault {
   const char* name;

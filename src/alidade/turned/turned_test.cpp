@@ -57,7 +57,7 @@ TurnedScene small_scene() {
 }
 
 /// ALIDADE_TEST_TRIALS=8 draws as many.
-const int few = testing::trials(4);
+const int few = testing::trials(2);
 
 TEST(Turned, FindsTheCameraOfCleanMatchesWithinItsSigma) {
   const Drawn drawn = draw(small_scene(), 20, on_the_spot());

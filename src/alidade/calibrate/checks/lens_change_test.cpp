@@ -73,7 +73,7 @@ std::uint64_t seed_of(int draw) { return static_cast<std::uint64_t>(draw + 1); }
 
 // One set in 200 shows a change by chance, one in 20 a drift that is not proved.
 TEST(LensChange, ALensThatStaysIsGood) {
-  const int draws = trials(5);
+  const int draws = trials(3);
   int named = 0, good = 0;
   for (int draw = 0; draw < draws; ++draw) {
     const Calibration result = testing::sample_calibration(changing_views(drift(0.0), seed_of(draw)));
@@ -86,7 +86,7 @@ TEST(LensChange, ALensThatStaysIsGood) {
 
 // 99 % power: of 20 draws two are missed once in 60 runs of the test.
 TEST(LensChange, ADriftOfTheStatedSizeIsSeen) {
-  const int draws = trials(4);
+  const int draws = trials(3);
   int seen = 0;
   for (int draw = 0; draw < draws; ++draw) {
     const double size = study_of(changing_views(drift(0.0), seed_of(draw))).seen_from.value();
@@ -124,7 +124,7 @@ std::vector<BoardView> focused_views(double autofocus, std::uint64_t seed) {
 
 /// Named, and then within σ of far points' lens. (Of 1 % one set in twelve shows less than 2.5σ, and is silent.)
 TEST(LensChange, AnAutofocusIsNamedAndCountsFarPoints) {
-  const int draws = trials(4);
+  const int draws = trials(3);
   for (const double autofocus : {0.01, 0.02}) {
     int named = 0, silent = 0;
     for (int draw = 0; draw < draws; ++draw) {
@@ -147,7 +147,7 @@ TEST(LensChange, AnAutofocusIsNamedAndCountsFarPoints) {
 }
 
 TEST(LensChange, WhereTheOrderSaysNothingNothingIsNamed) {
-  const int draws = trials(4);
+  const int draws = trials(3);
   int named = 0;
   for (int draw = 0; draw < draws; ++draw) {
     std::vector<BoardView> views = changing_views(drift(0.01), seed_of(draw));

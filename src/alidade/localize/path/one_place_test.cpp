@@ -45,7 +45,7 @@ class OnePlaceOf : public ::testing::TestWithParam<std::pair<HoverLens, int>> {}
 /// The camera moves by a seventh of the distance, with a wide lens and its large σ as well.
 TEST_P(OnePlaceOf, ACameraThatTranslatesIsGood) {
   const auto [lens, others] = GetParam();
-  const int draws = testing::trials(2);
+  const int draws = testing::trials(1);
   int good = 0;
   for (int draw = 0; draw < draws; ++draw) {
     const Outcome outcome = outcome_of(lens, others, 1.0, draw);
@@ -78,7 +78,7 @@ TEST(OnePlace, RotationInPlaceIsNamed) {
 /// eighth.
 TEST(OnePlace, AStillCameraIndicatesNoOtherLens) {
   double squares = 0.0;
-  const int draws = testing::trials(3);
+  const int draws = testing::trials(2);
   for (int draw = 0; draw < draws; ++draw) {
     const Outcome outcome = outcome_of({.num_others = 30, .sway = 0.0, .turn = 0.0}, draw);
     const Localization& result = outcome.result;
@@ -100,7 +100,7 @@ TEST(OnePlace, AStillCameraIndicatesNoOtherLens) {
 /// points.
 TEST(OnePlace, ACameraAtOnePlaceIsSolvedHoweverLong) {
   double nees = 0.0;
-  const int draws = testing::trials(2);
+  const int draws = testing::trials(1);
   for (int draw = 0; draw < draws; ++draw) {
     for (const auto& [others, turn] : {std::pair{0, 0.0}, {30, 0.0}, {0, 1.0}, {30, 1.0}}) {
       const testing::Hover scene{.num_frames = 1500, .num_others = others, .sway = 0.0, .turn = turn};

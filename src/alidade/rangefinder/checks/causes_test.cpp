@@ -25,7 +25,7 @@ struct ShotFault {
 class ShotFaults : public ::testing::TestWithParam<ShotFault> {};
 
 TEST_P(ShotFaults, AreNeverSilent) {
-  const int num_logs = testing::trials(5);
+  const int num_logs = testing::trials(3);
   for (const auto method : {RangefinderMethod::joint, RangefinderMethod::plane, RangefinderMethod::spot}) {
     if (method == RangefinderMethod::spot && !GetParam().spots_suffice) continue;
     for (int draw = 1; draw <= num_logs; ++draw) {

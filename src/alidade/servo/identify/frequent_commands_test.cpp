@@ -31,7 +31,7 @@ ServoLogScene frequent_chirp(bool is_rate_plant, int commands_per_row, double ra
 /// Held to the next row, a sine that is commanded more often is half a row late in the end: latencies 5 ms of 83 short
 /// at 50 rows a second, 15 ms at 25, up to 118σ, at a good verdict.
 TEST(FrequentCommands, MoreThanRowsAreLoggedAreFoundOrCounted) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(1));
   for (const bool is_rate_plant : {false, true}) {
     for (const auto& [per_row, rate_hz] : {std::pair{2, 50.0}, std::pair{4, 25.0}, std::pair{20, 50.0}}) {
       for (std::uint64_t seed = 1; seed <= draws; ++seed) {
@@ -50,7 +50,7 @@ TEST(FrequentCommands, MoreThanRowsAreLoggedAreFoundOrCounted) {
 
 /// Commands that change at rows alone: the ripple says so, and the verdict stays good.
 TEST(FrequentCommands, AtRowsStayThere) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(3));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
   for (const bool is_rate_plant : {false, true}) {
     for (const double rate_hz : {50.0, 100.0}) {
       for (std::uint64_t seed = 1; seed <= draws; ++seed) {

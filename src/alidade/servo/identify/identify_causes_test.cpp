@@ -69,7 +69,7 @@ TEST(ServoCauses, FlawedResponseIsTheIntegralOfItsEquations) {
 
 TEST(ServoCauses, CleanLogsAreGood) {
   int good = 0, runs = 0;
-  const auto draws = static_cast<std::uint64_t>(testing::trials(8));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(4));
   for (const bool is_rate_plant : {false, true}) {
     for (const bool is_chirp : {false, true}) {
       for (std::uint64_t seed = 1; seed <= draws; ++seed, ++runs) {
@@ -152,7 +152,7 @@ std::vector<double> errors_in_sigma(const FlawCase& of, const ServoFit& fit) {
 
 /// Found by its name, at its size, and the rest as if it were not there.
 TEST(ServoCauses, FlawsAreEstimated) {
-  const int draws = testing::trials(6);
+  const int draws = testing::trials(3);
   const double most = 1.0 + 5.0 * std::sqrt(2.0 / (4.0 * draws));  // squares whose mean is 1: 5 σ of the mean
   for (const FlawCase& of : flaw_cases) {
     int num_good = 0;
@@ -208,7 +208,7 @@ std::vector<ServoSample> log_of_gain(bool is_rate_plant, bool is_chirp, const Se
 /// 5 % between the directions, over the log, and from small commands to large ones: they were taken for drifts of
 /// clocks, limits, dead bands and slips, and a log of a rate plant for one that does not determine its gain.
 TEST(ServoCauses, AGainThatIsNotOneIsEstimated) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(4));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
   int good = 0, runs = 0;
   double sum2 = 0.0;
   for (const std::size_t flaw : {std::size_t{ServoFlaw::gain_difference}, std::size_t{ServoFlaw::gain_drift},
@@ -246,7 +246,7 @@ TEST(ServoCauses, AGainThatIsNotOneIsEstimated) {
 
 /// A log that begins with a command while an earlier one still has its effect: at rest, and in the middle of a run.
 TEST(ServoCauses, AnEarlierCommandIsEstimated) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(6));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(3));
   int good = 0, runs = 0;
   double sum2 = 0.0;
   for (const bool is_rate_plant : {false, true}) {

@@ -107,7 +107,7 @@ TEST(LogFaults, ASlipOfTheEncoderIsEstimated) {
 }
 
 TEST(LogFaults, CleanLogsHaveNone) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(4));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
   for (const bool is_rate_plant : {false, true}) {
     for (std::uint64_t seed = 1; seed <= draws; ++seed) {
       const std::vector<ServoSample> clean = log_with_lost(late_scene(is_rate_plant), seed, {});

@@ -47,7 +47,7 @@ TEST(ServoLogTimes, AClockThatDriftsIsThatOfALogReadLater) {
 
 /// A drift of 0.1 % was a second lag, with a time constant 8σ and a latency 15σ off at a good verdict.
 TEST(ServoLogTimes, AClockThatDriftsIsEstimated) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(1));
   double sum2 = 0.0;
   for (const bool is_rate_plant : {false, true}) {
     for (const bool is_chirp : {false, true}) {
@@ -104,7 +104,7 @@ std::vector<ServoSample> read_late(std::vector<ServoSample> log, const ServoLogS
 
 /// Angles read 0 to 6 ms after their time stamps passed for a latency 10 to 20σ shorter.
 TEST(ServoLogTimes, StampsThatErrAreCounted) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(4));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
   std::uint64_t num_clean_seen = 0;
   for (const bool is_rate_plant : {false, true}) {
     const ServoLogScene scene = scene_of(is_rate_plant, true);
@@ -209,7 +209,7 @@ TEST(ServoLogTimes, ALimitThatHardlyLimitsIsNoCommandBetweenRows) {
 }
 
 TEST(ServoLogTimes, CommandsAtRowsStayThere) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(3));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
   for (const bool is_rate_plant : {false, true}) {
     for (std::uint64_t seed = 1; seed <= draws; ++seed) {
       const Identification identified = identify(commanded_log(late_scene(is_rate_plant), Commanded::at_rows, seed));

@@ -109,7 +109,7 @@ std::vector<double> errors_of(const Identification& found, const HeldAxis& axis)
 /// Without it a 20 Hz encoder in a log of 100 to 200 rows a second made accelerations 7 and 21 % wrong at a good
 /// verdict.
 TEST(SampledLog, AxesAreIdentifiedThroughASlowEncoder) {
-  const int draws_of_each = testing::trials(5);
+  const int draws_of_each = testing::trials(3);
   int good = 0, runs = 0;
   double sum2 = 0.0, count = 0.0;
   for (int kind = 0; kind < 4; ++kind) {

@@ -4,13 +4,14 @@
 #include <numeric>
 #include <utility>
 
+#include "alidade/calibrate/changes/lens_change.h"
+#include "alidade/calibrate/changes/photo_effects.h"
+#include "alidade/calibrate/changes/two_lenses.h"
 #include "alidade/calibrate/checks/assumed.h"
 #include "alidade/calibrate/checks/better_model.h"
 #include "alidade/calibrate/checks/calibration_verdict.h"
 #include "alidade/calibrate/checks/judge.h"
-#include "alidade/calibrate/checks/lens_change.h"
 #include "alidade/calibrate/checks/model_errors.h"
-#include "alidade/calibrate/checks/two_lenses.h"
 #include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/calibrate/study.h"
 #include "alidade/description/natural_order.h"
@@ -80,17 +81,27 @@ LensChangeStudy find_change(std::span<const ViewScore> scores, const OrderTaken&
   return study;
 }
 
-/// Photos of two lenses, looked for where photos disagree for no other reason.
-void name_two_lenses(std::span<const ViewScore> scores, Calibration& result) {
+/// Photos of two lenses: looked for where photos disagree for no other reason.
+std::optional<TwoLenses> find_two_lenses(std::span<const ViewScore> scores, const Calibration& result,
+                                         std::vector<std::string>& photos) {
   std::vector<BoardView> views;  // whole: a lens of its own makes outliers of corners
-  std::vector<std::string> photos;
   for (std::size_t k = 0; k < result.board_views.size(); ++k) {
     if (!result.views[k].used) continue;
     views.push_back(result.board_views[k]);
     photos.push_back(result.board_views[k].photo);
   }
-  const auto found = two_lenses(result.board, views, scores, result.config, result);
-  if (found) heed_two_lenses(*found, photos, result.verdict);
+  return two_lenses(result.board, views, scores, result.config, result);
+}
+
+/// Names why the photos disagree: two lenses, or a centre or a focal length that each photo has its own of. A change of
+/// the focal length over them goes before, but where it is the centre that differs there is none.
+void explain_disagreement(std::span<const ViewScore> scores, const LensChangeStudy& change, Calibration& result) {
+  const bool changes = change.change && change.change->is_proved;
+  std::vector<std::string> photos;
+  const auto two = changes ? std::nullopt : find_two_lenses(scores, result, photos);
+  if (two) return heed_two_lenses(*two, photos, result.verdict);
+  const auto effect = photo_effect(scores, result);
+  if (effect && (effect->is_centre || !changes)) heed_photo_effect(*effect, result.verdict);
 }
 
 /// The board as solved: decides its shape, and solves again where that is not the one of the first solve.
@@ -166,8 +177,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
   heed_change(change, taken.photos, result.verdict);
-  if (result.verdict.state != State::good && !(change.change && change.change->is_proved))
-    name_two_lenses(scores, result);
+  if (result.verdict.state != State::good) explain_disagreement(scores, change, result);
   heed_assumptions(result.assumed, result.verdict);
   return result;
 }

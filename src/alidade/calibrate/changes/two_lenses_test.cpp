@@ -1,4 +1,4 @@
-#include "alidade/calibrate/checks/two_lenses.h"
+#include "alidade/calibrate/changes/two_lenses.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

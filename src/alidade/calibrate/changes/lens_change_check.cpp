@@ -1,4 +1,4 @@
-#include "alidade/calibrate/checks/lens_change.h"
+#include "alidade/calibrate/changes/lens_change.h"
 
 // What the verdict says of a lens that changes.
 

@@ -1,4 +1,4 @@
-#include "alidade/calibrate/checks/two_lenses.h"
+#include "alidade/calibrate/changes/two_lenses.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "alidade/board/board_pose.h"
-#include "alidade/calibrate/checks/lens_change.h"
+#include "alidade/calibrate/changes/lens_change.h"
 
 namespace alidade {
 namespace {

@@ -137,6 +137,54 @@ class Lister {
   std::vector<Eigen::MatrixXd> by_;
 };
 
+/// How fast a head's readings change about that time [rad/s], from the readings beside it.
+Eigen::Vector2d reading_rate(std::span<const TargetObservation> observations, std::size_t head, double t_s) {
+  const TargetObservation *before = nullptr, *after = nullptr;
+  for (const TargetObservation& each : observations) {
+    if (each.head != head) continue;
+    if (each.t_capture_s < t_s && (before == nullptr || each.t_capture_s > before->t_capture_s)) before = &each;
+    if (each.t_capture_s > t_s && (after == nullptr || each.t_capture_s < after->t_capture_s)) after = &each;
+  }
+  constexpr double near_s = 1.0;
+  if (before == nullptr || after == nullptr || after->t_capture_s - before->t_capture_s > near_s)
+    return Eigen::Vector2d::Zero();
+  return (after->pan_tilt_rad - before->pan_tilt_rad) / (after->t_capture_s - before->t_capture_s);
+}
+
+/// Angles that all heads read before their images are taken: the target is where the rays of these angles meet, a
+/// little in its past. As the heads follow it no observation shows that.
+std::optional<Assumption> angles_before_images(std::span<const TargetObservation> observations,
+                                               std::span<const RigHead> heads, const TrackReport& report) {
+  constexpr std::size_t max_steps = 40;
+  constexpr double ordinary_delay_s = 0.001;
+  Eigen::Vector3d moved2 = Eigen::Vector3d::Zero(), in_sigma2 = Eigen::Vector3d::Zero();
+  double num = 0.0;
+  for (std::size_t i = report.steps.size() / 10; i < report.steps.size(); i += 1 + report.steps.size() / max_steps) {
+    const TrackStep& step = report.steps[i];
+    if (!step.has_belief || !step.accepted) continue;
+    const auto readings = readings_at(observations, heads.size(), step.t_s);
+    const auto by = meeting_sensitivity(heads, readings, step.belief.x.head<3>(), step.belief.x.segment<3>(3));
+    Eigen::Vector3d moved = Eigen::Vector3d::Zero();
+    for (std::size_t h = 0; h < by.size(); ++h)
+      if (by[h].size() > 0)
+        moved += ordinary_delay_s * by[h].middleCols<2>(pan_zero_param) * reading_rate(observations, h, step.t_s);
+    moved2 += moved.cwiseAbs2();
+    in_sigma2 += moved.cwiseAbs2().cwiseQuotient(step.belief.P.diagonal().head<3>());
+    num += by.empty() ? 0.0 : 1.0;
+  }
+  if (!(num > 0.0)) return std::nullopt;
+  Eigen::Index worst = 0;
+  in_sigma2.maxCoeff(&worst);
+  constexpr std::array<const char*, 3> names{"x_m", "y_m", "z_m"};
+  return Assumption{.name = "angles (s)",
+                    .value = std::nan(""),
+                    .ordinary = ordinary_delay_s,
+                    .moves = std::sqrt(in_sigma2[worst] / num),
+                    .moved = names[static_cast<std::size_t>(worst)],
+                    .moved_by = std::sqrt(moved2[worst] / num),
+                    .remedy = "read the angles when the images are taken, or interpolate them to these times"};
+}
+
 /// By how much a third more or less of acceleration moves the track: RMS over its steps, in σ of each.
 double moved_by_motion(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                        const FollowConfig& config, const TrackReport& report) {
@@ -255,6 +303,7 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
   if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations say
   lister.assumed.push_back(std::move(motion));
+  if (auto row = angles_before_images(observations, rig.heads, report)) lister.assumed.push_back(std::move(*row));
   if (auto row = times_not_tested(observations, report, given.sigma_clock_s)) lister.assumed.push_back(std::move(*row));
   if (auto row = not_tested(observations, rig, config, report)) lister.assumed.push_back(std::move(*row));
   return std::move(lister.assumed);

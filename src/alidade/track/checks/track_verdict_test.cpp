@@ -103,8 +103,41 @@ TEST(TrackAssumed, WhatIsExactMovesNothingAndWhatIsUnknownDoes) {
   for (const Assumption& what : exact)
     if (what.name.ends_with(".not_tested"))  // a sentence
       EXPECT_TRUE(std::isnan(what.moves));
-    else if (!what.name.starts_with("motion"))
+    else if (!what.name.starts_with("motion") && what.name != "angles (s)")
       EXPECT_EQ(what.moves, 0.0) << what.name;
+}
+
+/// Angles of the image before, of all heads: where these follow the target, it is found where it was then.
+TEST(TrackAssumed, AnglesBeforeTheirImagesAreListed) {
+  const TrackScene scene = *track_scenario("C");
+  const auto observations = testing::observations_of(scene, 2);
+  constexpr double delay_s = 0.02;
+  std::vector<TargetObservation> late = observations;
+  for (TargetObservation& each : late) {
+    const TargetObservation *before = nullptr, *after = nullptr;
+    for (const TargetObservation& other : observations) {
+      if (other.head != each.head) continue;
+      if (other.t_capture_s <= each.t_capture_s - delay_s) before = &other;
+      if (other.t_capture_s > each.t_capture_s - delay_s && after == nullptr) after = &other;
+    }
+    if (before == nullptr || after == nullptr) continue;
+    const double share =
+        (each.t_capture_s - delay_s - before->t_capture_s) / (after->t_capture_s - before->t_capture_s);
+    each.pan_tilt_rad = before->pan_tilt_rad + share * (after->pan_tilt_rad - before->pan_tilt_rad);
+  }
+  const TrackReport right = track_target(observations, scene.heads, {}), wrong = track_target(late, scene.heads, {});
+  Rig rig;
+  rig.heads = scene.heads;
+  const auto assumed = track_assumed(observations, rig, {}, right, {});
+  const auto row = std::ranges::find(assumed, "angles (s)", &Assumption::name);
+  ASSERT_NE(row, assumed.end());
+  double moved2 = 0.0, num = 0.0;
+  const Eigen::Index k = row->moved == "x_m" ? 0 : row->moved == "y_m" ? 1 : 2;
+  for (std::size_t i = right.steps.size() / 10; i < right.steps.size(); ++i) {
+    moved2 += std::pow(wrong.steps[i].belief.x[k] - right.steps[i].belief.x[k], 2);
+    num += 1.0;
+  }
+  EXPECT_NEAR(std::sqrt(moved2 / num) / delay_s, row->moved_by / row->ordinary, 0.35 * row->moved_by / row->ordinary);
 }
 
 }  // namespace

@@ -28,6 +28,7 @@ struct ImuNoise {
   double sigma_rate_bias = 0.02;     ///< At first. [rad/s]
   double sigma_force_bias = 0.3;     ///< At first. [m/s²]
   double sigma_force_scale = 0.003;  ///< Of the accelerometer's scale factor, which all its readings share.
+  double sigma_axes = 0.01;          ///< By which axes differ in scale or are not perpendicular, of either sensor.
 };
 
 /// How an IMU is fixed to a camera.

@@ -79,4 +79,21 @@ std::optional<ImuStep> preintegrated(std::span<const ImuReading> readings, doubl
   return step;
 }
 
+std::vector<ImuReading> without_frozen(std::vector<ImuReading> readings) {
+  constexpr std::size_t min_equal = 10;
+  constexpr double min_s = 0.1;
+  std::vector<ImuReading> kept;
+  for (std::size_t i = 0; i < readings.size();) {
+    std::size_t end = i + 1;
+    while (end < readings.size() && readings[end].rate_rad_s == readings[i].rate_rad_s &&
+           readings[end].force_m_s2 == readings[i].force_m_s2)
+      ++end;
+    const bool is_frozen = end - i >= min_equal && readings[end - 1].t_s - readings[i].t_s >= min_s;
+    const auto from = readings.begin() + static_cast<std::ptrdiff_t>(i);
+    kept.insert(kept.end(), from, is_frozen ? from + 1 : readings.begin() + static_cast<std::ptrdiff_t>(end));
+    i = end;
+  }
+  return kept;
+}
+
 }  // namespace alidade

@@ -8,6 +8,10 @@
 
 namespace alidade {
 
+/// The readings without those of a sensor that hangs: of ten and more that are equal in all digits, for 0.1 s or
+/// longer, the first is kept. What is left out is a gap.
+[[nodiscard]] std::vector<ImuReading> without_frozen(std::vector<ImuReading> readings);
+
 /// Preintegrated IMU readings between two times, in the IMU's axes at the first: rotation, and the effect of specific
 /// force f alone on velocity and position, ∫ R f and ∫∫ R f. With position p, velocity v and rotation R of the IMU at
 /// the first time, p⁺ at the second is p + v Δ + ½ g Δ² + R `position`, v⁺ is v + g Δ + R `velocity`. C. Forster et

@@ -87,5 +87,19 @@ TEST(Preintegration, GapsAndTimesOutsideHaveNone) {
   EXPECT_TRUE(preintegrated(imu.readings, 0.9, 1.0, 0.02, zero, zero));
 }
 
+TEST(Preintegration, AFrozenSensorIsAGap) {
+  std::vector<ImuReading> readings;
+  for (int i = 0; i < 100; ++i) {
+    const double value = i >= 40 && i < 70 ? 40.0 : i >= 20 && i < 25 ? 20.0 : i;  // five equal ones are chance
+    readings.push_back({0.01 * i, Eigen::Vector3d::Constant(0.1 * value), Eigen::Vector3d::Constant(value)});
+  }
+  const std::vector<ImuReading> kept = without_frozen(readings);
+  ASSERT_EQ(kept.size(), 71u);
+  EXPECT_EQ(kept[40].t_s, readings[40].t_s);
+  EXPECT_EQ(kept[41].t_s, readings[70].t_s);
+  std::vector<ImuReading> at_rest(12, readings[0]);  // without times between them
+  EXPECT_EQ(without_frozen(at_rest).size(), 12u);
+}
+
 }  // namespace
 }  // namespace alidade

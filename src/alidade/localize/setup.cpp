@@ -143,7 +143,7 @@ void add_faults(const Imu& imu, Sentences& found) {
   const ImuNoise& noise = imu.noise;
   for (const double sigma :
        {noise.rate_density, noise.force_density, noise.rate_walk, noise.force_walk, noise.sigma_rate_bias,
-        noise.sigma_force_bias, noise.sigma_force_scale, imu.gravity_m_s2, imu.sigma_gravity_m_s2})
+        noise.sigma_force_bias, noise.sigma_force_scale, noise.sigma_axes, imu.gravity_m_s2, imu.sigma_gravity_m_s2})
     if (!(sigma > 0.0) || !std::isfinite(sigma)) {
       found.emplace_back("gravity, a density of the IMU's noise or a sigma of it is not above 0");
       break;

@@ -100,15 +100,22 @@ std::string imu_fault_text(const ImuEstimate& imu) {
 void add_imu(const Localization& report, Verdict& verdict) {
   if (!report.imu || report.imu->fault != ImuFault::none) return;
   const ImuEstimate& imu = *report.imu;
-  constexpr double many = 0.05, much = 3.0, apart = 3.5;
-  if (imu.gravity_sigmas > apart)
+  constexpr double many = 0.05, much = 3.0, apart = 3.5, scales_apart = 3.0;
+  if (imu.gravity_sigmas > scales_apart)
     verdict.checks.push_back(
         {"IMU scale factor", State::care,
          fmt::format(
              "by the IMU's forces gravity is {:.3f} m/s², not as given ({:.2g}σ): their scale factor is off by "
              "more than its σ, and the path's scale by as much; calibrate it, or give --sigma-accelerometer-scale",
              imu.gravity_in_world.norm(), imu.gravity_sigmas),
-         imu.gravity_sigmas, apart, "σ", "path"});
+         imu.gravity_sigmas, scales_apart, "σ", "path"});
+  if (imu.axes_sigmas > apart)
+    verdict.checks.push_back(
+        {"IMU axes", State::care,
+         fmt::format("axes of the IMU differ in scale, or are not perpendicular, by {:.2g} % ({:.2g}σ): estimated with "
+                     "the path; calibrate it, or give --sigma-imu-axes",
+                     100.0 * imu.axes_differ, imu.axes_sigmas),
+         imu.axes_sigmas, apart, "σ", "path"});
   const double late = std::abs(imu.late_s);
   if (late > imu.frame_period_s)
     verdict.checks.push_back({"IMU clock", State::care,

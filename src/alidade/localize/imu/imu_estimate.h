@@ -41,6 +41,8 @@ struct ImuEstimate {
   Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero(), sigma_gravity = Eigen::Vector3d::Zero();
   double gravity_sigmas =
       0.0;  ///< By how many of their σ gravity's size and the forces' scale factor are pulled apart.
+  /// By how many σ the axes of a sensor differ in scale or are not perpendicular, the most of one number; and its size.
+  double axes_sigmas = 0.0, axes_differ = 0.0;
   /// At the end, in the IMU's axes.
   Eigen::Vector3d rate_bias = Eigen::Vector3d::Zero(), sigma_rate_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d force_bias = Eigen::Vector3d::Zero(), sigma_force_bias = Eigen::Vector3d::Zero();

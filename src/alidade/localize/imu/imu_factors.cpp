@@ -67,13 +67,22 @@ ImuState ImuState::moved(const Eigen::VectorXd& by) const {
   out.imu_in_cam += by.segment<3>(place_at());
   out.late_s += by[late_at()];
   out.force_scale += by[scale_at()];
+  for (Eigen::Index i = 0; i < 9; ++i) out.force_axes(i / 3, i % 3) += by[force_axes_at() + i];
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Index j = (i + 1) % 3, k = (i + 2) % 3;
+    out.rate_axes(i, i) += by[rate_axes_at() + i];
+    out.rate_axes(j, k) += by[rate_axes_at() + 3 + i];
+    out.rate_axes(k, j) += by[rate_axes_at() + 3 + i];
+  }
   return out;
 }
 
 ImuRows rotation_rows(const ImuStepAt& at, std::span<const Rigid3, 2> world_from_cam, const ImuState& imu) {
   const ImuStep& step = at.step;
   const ImuState::Bias bias = imu.bias_at(at.t_s);
-  const Vector3 more = step.rotation_by_rate * (bias.rate - at.rate_bias) + imu.late_s * step.rotation_by_time;
+  const Vector3 rotated = log_so3(step.rotation);
+  const Vector3 more =
+      step.rotation_by_rate * (bias.rate - at.rate_bias) + imu.late_s * step.rotation_by_time + imu.rate_axes * rotated;
   const Eigen::Quaterniond in_imu = step.rotation * exp_so3(more);
   const Eigen::Quaterniond read = imu.turn * in_imu * imu.turn.conjugate();
   const Eigen::Quaterniond between_them = world_from_cam[0].rotation.conjugate() * world_from_cam[1].rotation;
@@ -89,6 +98,11 @@ ImuRows rotation_rows(const ImuStepAt& at, std::span<const Rigid3, 2> world_from
   const Matrix3 by_more = by_read * turn * right_jacobian(more);
   add_bias(bias, by_more * step.rotation_by_rate, Matrix3::Zero(), rows);
   rows.J_imu.col(imu.late_at()) = by_more * step.rotation_by_time;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Index j = (i + 1) % 3, k = (i + 2) % 3;
+    rows.J_imu.col(imu.rate_axes_at() + i) = by_more.col(i) * rotated[i];
+    rows.J_imu.col(imu.rate_axes_at() + 3 + i) = by_more.col(j) * rotated[k] + by_more.col(k) * rotated[j];
+  }
   rows.J_imu.middleCols<3>(imu.turn_at()) = by_read * (read.toRotationMatrix().transpose() - Matrix3::Identity());
   return rows;
 }
@@ -102,7 +116,8 @@ ImuRows force_rows(const ImuStepAt& first, const ImuStepAt& second, std::span<co
     R[i] = world_from_cam[i].rotation.toRotationMatrix();
     q[i] = world_from_cam[i].translation + R[i] * imu.imu_in_cam;
   }
-  const Matrix3 T = imu.turn.toRotationMatrix(), R0t = R[0].transpose(), R01 = R0t * R[1];
+  const Matrix3 turn = imu.turn.toRotationMatrix(), R0t = R[0].transpose(), R01 = R0t * R[1];
+  const Matrix3 T = turn * (Matrix3::Identity() + imu.force_axes);
   const double scale = 1.0 + imu.force_scale;
   const ImuState::Bias bias1 = imu.bias_at(first.t_s), bias2 = imu.bias_at(second.t_s);
   const Corrected m1 = corrected(first, bias1, imu.late_s, 1.0, -1.0 / dt1);
@@ -127,6 +142,10 @@ ImuRows force_rows(const ImuStepAt& first, const ImuStepAt& second, std::span<co
   rows.J_imu.middleCols<3>(imu.place_at()) = (R0t * R[2] - R01) / dt2 - (R01 - Matrix3::Identity()) / dt1;
   rows.J_imu.col(imu.late_at()) = -scale * (T * m1.by_time + R01 * T * m2.by_time);
   rows.J_imu.col(imu.scale_at()) = -in_first - R01 * in_second;
+  const Matrix3 second_turn = R01 * turn;
+  for (Eigen::Index i = 0; i < 9; ++i)
+    rows.J_imu.col(imu.force_axes_at() + i) =
+        -scale * (turn.col(i / 3) * m1.value[i % 3] + second_turn.col(i / 3) * m2.value[i % 3]);
   return rows;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <array>
 
 #include "alidade/simulate/imu/imu_readings.h"
@@ -30,6 +31,8 @@ Window window() {
   scene.mounting.cam_from_imu = {exp_so3({0.02, -0.01, 0.03}), {0.05, -0.03, 0.02}};
   scene.late_s = 0.004;
   scene.force_scale = 0.01;
+  scene.force_axes << 0.02, -0.01, 0.015, 0.005, -0.012, 0.01, -0.008, 0.006, -0.008;
+  scene.rate_axes << 0.004, 0.003, -0.002, 0.003, -0.005, 0.001, -0.002, 0.001, 0.003;
   const ImuSequence imu = simulate_imu(scene, path_at, 0.0, 2.0, 1);
   const std::array<double, 3> t_s{1.0, 1.05, 1.15};
   const Eigen::Matrix3d R = scene.mounting.cam_from_imu.rotation.toRotationMatrix();
@@ -44,6 +47,9 @@ Window window() {
   state.imu_in_cam = scene.mounting.cam_from_imu.translation;
   state.late_s = scene.late_s;
   state.force_scale = scene.force_scale;
+  const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
+  state.force_axes = (one + scene.force_axes).inverse() - one;
+  state.rate_axes = (one + scene.rate_axes).inverse() - one;
   for (std::size_t k = 0; k < 3; ++k) out.poses[k] = path_at(t_s[k]);
   for (std::size_t k = 0; k < 2; ++k) {
     ImuStepAt& at = out.steps[k];
@@ -109,6 +115,8 @@ TEST(ImuFactors, TheVarianceIsThatOfSlowSums) {
   ImuScene scene = window().scene;
   scene.mounting.cam_from_imu = {};
   scene.late_s = scene.force_scale = 0.0;
+  scene.force_axes.setZero();
+  scene.rate_axes.setZero();
   scene.rate_bias.setZero();
   scene.force_bias.setZero();
   scene.rate_hz = 300.0;

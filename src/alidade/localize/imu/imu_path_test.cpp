@@ -192,6 +192,63 @@ TEST(LocalizeImu, AScaleFactorThatIsOffIsNamed) {
   }
 }
 
+/// Largest error of a position in its σ, once the path stands in the frame of the truth: its scale as found.
+double worst_sigmas(const Localization& result, const ImuRun& run) {
+  std::vector<Eigen::Vector3d> truth, path;
+  for (std::size_t k = 0; k < result.path.size(); ++k) {
+    truth.push_back(run.truth[k].world_from_cam.translation);
+    path.push_back(result.path[k].world_from_cam.translation);
+  }
+  const auto to_truth = aligned(path, truth, true);
+  double worst = 0.0;
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const Eigen::Vector3d error = to_truth->b_from_a * path[k] - truth[k];
+    worst = std::max(worst, error.norm() / std::sqrt(result.path[k].cov.topLeftCorner<3, 3>().trace()));
+  }
+  return worst;
+}
+
+/// Axes of ordinary small IMUs: scales and angles off by 1 %. Taken for exact they put paths up to 12σ off.
+TEST(LocalizeImu, AxesThatDifferALittleAreCounted) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Draws draws(seed + 900);
+    ImuScene scene;
+    for (double& each : scene.force_axes.reshaped()) each = 0.01 * draws.normal();
+    for (double& each : scene.rate_axes.reshaped()) each = 0.01 * draws.normal();
+    const ImuRun run = swinging(seed, scene);
+    const Localization result = localize(run.frames, run.camera, with_imu(run), run.truth);
+    ASSERT_TRUE(result.imu);
+    ASSERT_EQ(result.imu->fault, ImuFault::none) << seed << ": " << result.verdict.sentence;
+    EXPECT_LT(worst_sigmas(result, run), 4.0) << seed << ": " << result.verdict.sentence;
+  }
+}
+
+TEST(LocalizeImu, AnAxisThatIsOffByMuchIsNamed) {
+  ImuScene scene;
+  scene.force_axes(1, 1) = 0.06;
+  const ImuRun run = swinging(3, scene);
+  const Localization result = localize(run.frames, run.camera, with_imu(run), run.truth);
+  ASSERT_TRUE(result.imu);
+  EXPECT_GT(result.imu->axes_sigmas, 3.5);
+  EXPECT_NE(result.verdict.sentence.find("axes of the IMU differ in scale"), std::string::npos)
+      << result.verdict.sentence;
+}
+
+/// Noise five times the one given: a path of few frames bends to it, and its residuals do not show it.
+TEST(LocalizeImu, NoiseIsThatOfTheReadings) {
+  ImuScene scene;
+  scene.noise.rate_density *= 5.0;
+  scene.noise.force_density *= 5.0;
+  const ImuRun run = swinging(2, scene);
+  LocalizeConfig config = with_imu(run);
+  config.imu->noise = ImuNoise{};
+  const Localization result = localize(run.frames, run.camera, config, run.truth);
+  ASSERT_TRUE(result.imu);
+  EXPECT_NEAR(result.imu->rate_noise_factor, 5.0, 1.0);
+  EXPECT_NEAR(result.imu->force_noise_factor, 5.0, 1.0);
+  EXPECT_LT(worst_sigmas(result, run), 4.0) << result.verdict.sentence;
+}
+
 TEST(LocalizeImu, WithoutAMountingItsRotationIsFound) {
   const ImuRun run = swinging(2);
   LocalizeConfig config = with_imu(run);

@@ -1,6 +1,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "alidade/estimation/median.h"
 #include "alidade/localize/imu/imu_alignment.h"
@@ -13,6 +16,36 @@ namespace alidade {
 namespace {
 
 constexpr double middle_of_three = 2.366;  // of χ² of three components, the median
+
+double square_of(double value) { return value * value; }
+
+/// σ of the readings' white noise over the one given, at least 1, by their second differences: a path of few frames
+/// bends to noise and shows little of it. Where those are not as white noise's, as of vibration or a filter, 1.
+double noise_factor(std::span<const ImuReading> readings, Eigen::Vector3d ImuReading::*of, double density) {
+  constexpr std::size_t min_readings = 100;
+  if (readings.size() < min_readings) return 1.0;
+  std::vector<double> periods_s, sizes;
+  double square = 0.0, next = 0.0, after = 0.0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero(), before_that = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i + 2 < readings.size(); ++i) {
+    const Eigen::Vector3d second = readings[i].*of - 2.0 * (readings[i + 1].*of) + readings[i + 2].*of;
+    periods_s.push_back(readings[i + 1].t_s - readings[i].t_s);
+    for (const double each : second) sizes.push_back(std::abs(each));
+    square += second.squaredNorm();
+    next += second.dot(before);
+    after += second.dot(before_that);
+    before_that = before;
+    before = second;
+  }
+  // Of white noise: −4 and 1 of 6.
+  const bool is_white = std::abs(next / square + 4.0 / 6.0) < 0.06 && std::abs(after / square - 1.0 / 6.0) < 0.08;
+  if (!is_white) return 1.0;
+  constexpr double median_of_normal = 0.6745, of_second_difference = 6.0;
+  const double sigma = median_of(std::move(sizes)) / (median_of_normal * std::sqrt(of_second_difference));
+  const double ratio = sigma * std::sqrt(median_of(std::move(periods_s))) / density;
+  constexpr double same = 1.2;
+  return std::isfinite(ratio) && ratio > same ? ratio : 1.0;
+}
 
 }  // namespace
 
@@ -33,6 +66,10 @@ void PathSmoother::begin_imu() {
     rates_used_.push_back(steps_.back().has_value());
   }
   for (std::size_t k = 0; k + 2 < num; ++k) forces_used_.push_back(steps_[k] && steps_[k + 1]);
+  rate_noise_ = rate_noise_floor_ =
+      square_of(noise_factor(imu.readings, &ImuReading::rate_rad_s, imu.noise.rate_density));
+  force_noise_ = force_noise_floor_ =
+      square_of(noise_factor(imu.readings, &ImuReading::force_m_s2, imu.noise.force_density));
   leave_out_blows();
 }
 
@@ -85,6 +122,25 @@ void PathSmoother::add_imu(const SmootherState& state, std::size_t k, SmootherSy
   if (uses_forces(k)) add(forces_at(state, k), force_noise_ * forces_variance(k));
 }
 
+/// What is known of how an IMU's axes differ, which are alike in all directions: a symmetric part has √2 less off the
+/// diagonal. The trace of the forces' is their scale, and is not estimated twice.
+void PathSmoother::add_given_axes(const ImuState& is, double sigma, PoseChain& chain, double& cost) {
+  const auto add = [&](int at, double error, double weight) {
+    chain.B(at, at) += weight;
+    chain.b[at] -= weight * error;
+    cost += weight * error * error;
+  };
+  const double weight = 1.0 / (sigma * sigma), no_trace = 1e4 * weight, trace = is.force_axes.trace();
+  for (int i = 0; i < 9; ++i) add(is.force_axes_at() + i, is.force_axes(i / 3, i % 3), weight);
+  for (int i = 0; i < 3; ++i) {
+    add(is.rate_axes_at() + i, is.rate_axes(i, i), weight);
+    add(is.rate_axes_at() + 3 + i, is.rate_axes((i + 1) % 3, (i + 2) % 3), 2.0 * weight);
+    chain.b[is.force_axes_at() + 4 * i] -= no_trace * trace;
+    for (int j = 0; j < 3; ++j) chain.B(is.force_axes_at() + 4 * i, is.force_axes_at() + 4 * j) += no_trace;
+  }
+  cost += no_trace * trace * trace;
+}
+
 /// What is known of an IMU before: sizes of its biases and of gravity, walks of the biases, mounting, clock.
 void PathSmoother::add_given_imu(const SmootherState& state, SmootherSystem& system) const {
   if (!problem_.imu) return;
@@ -119,6 +175,7 @@ void PathSmoother::add_given_imu(const SmootherState& state, SmootherSystem& sys
   add(is.place_at(), is.imu_in_cam - given.start.imu_in_cam, given.sigma_position_m);
   add_one(is.late_at(), is.late_s, given.sigma_late_s);
   add_one(is.scale_at(), is.force_scale, given.noise.sigma_force_scale);
+  add_given_axes(is, given.noise.sigma_axes, chain, system.cost);
   const double size = is.gravity_in_world.norm(), weight = std::pow(given.sigma_gravity_m_s2, -2);
   const double error = size - given.gravity_m_s2;
   const Eigen::Vector3d along = is.gravity_in_world / size;
@@ -133,13 +190,13 @@ bool PathSmoother::choose_steps() {
   if (!problem_.imu) return false;
   constexpr double gate = 21.1;  // χ² of three components: 99.99 %
   bool is_other = false;
-  const auto choose = [&](std::size_t num, const auto& has, const auto& chi2_of, double& noise,
+  const auto choose = [&](std::size_t num, const auto& has, const auto& chi2_of, double& noise, double floor,
                           std::vector<bool>& used) {
     std::vector<double> all;
     for (std::size_t k = 0; k < num; ++k)
       if (has(k)) all.push_back(chi2_of(k));
     if (all.empty()) return;
-    const double larger = std::max(1.0, median_of(all) / middle_of_three);
+    const double larger = std::max(floor, median_of(all) / middle_of_three);
     constexpr double same = 1.1;
     is_other = is_other || larger > same * noise || noise > same * larger;
     noise = larger;
@@ -154,11 +211,11 @@ bool PathSmoother::choose_steps() {
   choose(
       rates_used_.size(), [&](std::size_t k) { return steps_[k].has_value(); },
       [&](std::size_t k) { return rates_at(state_, k).error.squaredNorm() / rates_variance(k); }, rate_noise_,
-      rates_used_);
+      rate_noise_floor_, rates_used_);
   choose(
       forces_used_.size(), [&](std::size_t k) { return steps_[k] && steps_[k + 1]; },
       [&](std::size_t k) { return forces_at(state_, k).error.squaredNorm() / forces_variance(k); }, force_noise_,
-      forces_used_);
+      force_noise_floor_, forces_used_);
   return is_other;
 }
 

@@ -139,6 +139,7 @@ class PathSmoother {
   [[nodiscard]] double forces_variance(std::size_t k) const;
   void add_imu(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_given_imu(const SmootherState& state, SmootherSystem& system) const;
+  static void add_given_axes(const ImuState& is, double sigma, PoseChain& chain, double& cost);
   [[nodiscard]] bool choose_steps();
   void fill_imu(const SmootherSystem& system, const Eigen::MatrixXd& cov, const Asked& asked, SmoothedPath& path) const;
   [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& given_in_world) const;
@@ -193,9 +194,10 @@ class PathSmoother {
   std::optional<FixedCombination> fixed_;
   Eigen::VectorXd given_lens_;
   SmootherState state_;
-  std::vector<std::optional<ImuStepAt>> steps_;  ///< Of an IMU, from each frame to the next.
-  std::vector<bool> rates_used_, forces_used_;   ///< Of each step; of each frame and the two after it.
-  double rate_noise_ = 1.0, force_noise_ = 1.0;  ///< By which the given variances are larger.
+  std::vector<std::optional<ImuStepAt>> steps_;              ///< Of an IMU, from each frame to the next.
+  std::vector<bool> rates_used_, forces_used_;               ///< Of each step; of each frame and the two after it.
+  double rate_noise_ = 1.0, force_noise_ = 1.0;              ///< By which the given variances are larger,
+  double rate_noise_floor_ = 1.0, force_noise_floor_ = 1.0;  ///< and are by the readings alone.
   /// The frames in which a point is in the equations, by its observations; none: it has no part in them.
   struct Life {
     std::size_t first = 0, last = 0;

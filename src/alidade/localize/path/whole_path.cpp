@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "alidade/localize/checks/scale_readings.h"
@@ -246,10 +247,20 @@ void fill_estimate(const SmoothedImu& found, ImuEstimate& estimate) {
   estimate.num_missing = found.num_missing;
 }
 
-/// Gravity and the scale factor explain each other's errors: as far as both are from what was given, they disagree.
+/// Gravity, the scale factor and the scales of the axes explain each other's errors: as far
+/// as all are from what was given, they disagree.
 double gravity_sigmas(const ImuState& state, const Imu& given) {
   return std::hypot((state.gravity_in_world.norm() - given.gravity_m_s2) / given.sigma_gravity_m_s2,
-                    state.force_scale / given.noise.sigma_force_scale);
+                    state.force_scale / given.noise.sigma_force_scale,
+                    state.force_axes.diagonal().norm() / given.noise.sigma_axes);
+}
+
+/// By how much the axes are otherwise than given, the most of one number, in its σ.
+double axes_sigmas(const ImuState& state, const Imu& given, double& most) {
+  most = std::max(state.force_axes.cwiseAbs().maxCoeff(), state.rate_axes.cwiseAbs().maxCoeff());
+  const Eigen::Matrix3d rates = state.rate_axes.cwiseAbs();
+  const double between = std::max({rates(0, 1), rates(0, 2), rates(1, 2)});  // of which σ is smaller
+  return std::max(most, std::numbers::sqrt2 * between) / given.noise.sigma_axes;
 }
 
 /// Whether a path with an IMU is one: its scale is determined, and its noise not many times that of any.
@@ -265,7 +276,9 @@ ImuFault fault_of(const SmoothedImu& found, bool is_in_metres) {
 double solve_with_imu(const Recording& recording, const LocalizeConfig& config, SmootherProblem problem,
                       SmoothedPath& smoothed, Localization& result) {
   if (!config.imu) return 1.0;
-  ImuAlignment alignment = align_imu(*config.imu, poses_of(problem, smoothed));
+  Imu imu = *config.imu;
+  imu.readings = without_frozen(std::move(imu.readings));
+  ImuAlignment alignment = align_imu(imu, poses_of(problem, smoothed));
   result.imu = alignment.estimate;
   ImuEstimate& estimate = *result.imu;
   estimate.frame_period_s = problem.period_s;
@@ -276,13 +289,14 @@ double solve_with_imu(const Recording& recording, const LocalizeConfig& config, 
   constexpr double hardly = 1.0;  // of all distances together
   if (!is_in_metres) believe_distances(hardly, problem);
   if (problem.gauge == PathGauge::similarity) problem.gauge = PathGauge::motion;
-  problem.imu = imu_to_solve(*config.imu, std::move(alignment), problem.t_s);
+  problem.imu = imu_to_solve(imu, std::move(alignment), problem.t_s);
   Localization again = result;
   auto with_imu = smooth(problem, recording.frames.frames(), again);
   estimate.fault = with_imu && with_imu->imu ? fault_of(*with_imu->imu, is_in_metres) : ImuFault::unsettled;
   if (with_imu && with_imu->imu) {
     fill_estimate(*with_imu->imu, estimate);
     estimate.gravity_sigmas = gravity_sigmas(with_imu->imu->state, *config.imu);
+    estimate.axes_sigmas = axes_sigmas(with_imu->imu->state, *config.imu, estimate.axes_differ);
   }
   if (estimate.fault != ImuFault::none) return 1.0;
   const SmoothedImu& found = *with_imu->imu;

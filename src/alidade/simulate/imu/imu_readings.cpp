@@ -21,11 +21,12 @@ ImuSequence simulate_imu(const ImuScene& scene, const std::function<Rigid3(doubl
     const Eigen::Vector3d acceleration = (after.translation - 2.0 * now.translation + before.translation) / (h * h);
     ImuReading reading;
     reading.t_s = t_s + scene.late_s;
-    reading.rate_rad_s = log_so3(before.rotation.conjugate() * after.rotation) / (2.0 * h) + rate_bias +
-                         scene.noise.rate_density / root_s * draws.normal3();
-    reading.force_m_s2 =
-        now.rotation.conjugate() * (acceleration - scene.gravity_in_world) / (1.0 + scene.force_scale) + force_bias +
-        scene.noise.force_density / root_s * draws.normal3();
+    const Eigen::Vector3d rate = log_so3(before.rotation.conjugate() * after.rotation) / (2.0 * h),
+                          force = now.rotation.conjugate() * (acceleration - scene.gravity_in_world);
+    reading.rate_rad_s =
+        rate + scene.rate_axes * rate + rate_bias + scene.noise.rate_density / root_s * draws.normal3();
+    reading.force_m_s2 = (force + scene.force_axes * force) / (1.0 + scene.force_scale) + force_bias +
+                         scene.noise.force_density / root_s * draws.normal3();
     out.readings.push_back(reading);
     out.rate_bias.push_back(rate_bias);
     out.force_bias.push_back(force_bias);

@@ -17,7 +17,9 @@ struct ImuScene {
   Eigen::Vector3d rate_bias{0.004, -0.007, 0.005};    ///< At first. [rad/s]
   Eigen::Vector3d force_bias{0.08, -0.05, 0.11};      ///< At first. [m/s²]
   double force_scale = 0.0;                           ///< True force over the read one, less 1.
-  double late_s = 0.0;                                ///< Of its clock.
+  /// Readings are (I + A) the true ones: scales that differ, axes that are not perpendicular or are rotated.
+  Eigen::Matrix3d rate_axes = Eigen::Matrix3d::Zero(), force_axes = Eigen::Matrix3d::Zero();
+  double late_s = 0.0;  ///< Of its clock.
 };
 
 struct ImuSequence {

@@ -119,7 +119,7 @@ ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   scene.dt_s = 1.0 / args.rate_hz;
   const UnderwaterSequence sequence = simulate_underwater(scene, run.options.seed);
   std::vector<TimedPose> truth;
-  for (const UnderwaterFrame& frame : sequence.frames) truth.push_back({frame.t_s, frame.world_from_cam});
+  for (const UnderwaterFrame& frame : sequence.frames) truth.push_back({frame.t_s, sequence.world_from_cam(frame.t_s)});
   std::vector<MapPoint> map;
   for (const UnderwaterPoint& point : sequence.points)
     map.push_back({point.id, point.point_in_world, Eigen::Matrix3d::Zero(), point.is_known, 0});
@@ -154,6 +154,12 @@ void add_mistakes(CLI::App& command, SimulateUnderwaterArgs& args, CLI::Option* 
       ->group(group);
   add_number(command, "--late", scene.late_s, "Images are taken so long before their times [s]", -10.0, 10.0)
       ->excludes(video)
+      ->group(group);
+  command
+      .add_option("--missing-every", scene.missing_every,
+                  "Of so many frames the last is missing, and those behind it are numbered through (0: none)")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str()
       ->group(group);
   add_number(command, "--target-speed", scene.target_speed_m_s,
              "Of the board along its x, against the other points [m/s]", -1.0, 1.0)

@@ -8,6 +8,7 @@
 
 #include "alidade/localize/checks/judge.h"
 #include "alidade/localize/checks/lens_kind.h"
+#include "alidade/localize/checks/missing_frames.h"
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
 #include "alidade/localize/frames/image_localizer.h"
@@ -139,6 +140,7 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
   else
     save_numbered(result);
   add_path_error(result);
+  result.missing = missing_frames(result.path);
   result.counts = {result.path.size(), result.path.size() - result.num_lost, result.num_lost, {}};
   result.assumed = localize_assumed(result);
   result.verdict = localize_verdict(result);

@@ -104,6 +104,12 @@ struct ResidualStructure {
   std::string worst_region;      ///< and where: "upper left".
 };
 
+/// Frames of a constant rate that seem to be missing before one of the path, though its time says that none is.
+struct MissingFrames {
+  std::size_t before = 0;  ///< Index in the path.
+  int num = 0;
+};
+
 /// How far an estimated path is from the true one. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM
 /// Systems", IROS 2012: ATE is the RMS distance of positions after alignment; RPE the RMS translation of
 /// (Q_i⁻¹ Q_i+1)⁻¹ (P_i⁻¹ P_i+1) between neighbours, with the aligned scale.
@@ -139,8 +145,9 @@ struct Localization {
   double still_share = 0.0;   ///< Of the image, edges that never move while the scene does: masked.
   double sigma_px =
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
-  std::size_t num_lost = 0;      ///< Frames whose pose observations do not constrain: waiting or predicted.
-  std::size_t num_repeated = 0;  ///< Of these, images that were the last one again while the camera moved.
+  std::size_t num_lost = 0;            ///< Frames whose pose observations do not constrain: waiting or predicted.
+  std::size_t num_repeated = 0;        ///< Of these, those that showed the last one again while the camera moved.
+  std::vector<MissingFrames> missing;  ///< Times that are numbered through them are wrong.
   std::size_t num_restarts = 0;
   std::size_t num_left = 0;                           ///< Times that a point was removed from a full filter.
   std::size_t num_loops = 0, num_loops_rejected = 0;  ///< Loop closures; of these rejected.

@@ -329,7 +329,11 @@ ObservationFrame ObservationLocalizer::numbered(ObservationFrame frame) {
 PathStep ObservationLocalizer::take(const ObservationFrame& given) {
   keep_gap(given.t_s);
   ObservationFrame frame = numbered(given);
-  PathStep step = taken(frame);
+  bool is_repeated = shows_last(frame) && engine_.has_begun();
+  if (is_repeated) engine_.predict_to(frame.t_s, period_s());
+  is_repeated = is_repeated && should_move(frame);
+  PathStep step = is_repeated ? passed_over(frame) : taken(frame);
+  if (is_repeated) frame.observations.clear();
   ++num_taken_;
   if (config_.smooths) frames_.add(std::move(frame));
   return step;

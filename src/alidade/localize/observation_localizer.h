@@ -34,6 +34,10 @@ class ObservationLocalizer {
   [[nodiscard]] ObservationFrame numbered(ObservationFrame frame);
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
   [[nodiscard]] bool start(const ObservationFrame& frame);
+  /// observation_repeats.cpp.
+  [[nodiscard]] bool shows_last(const ObservationFrame& frame);
+  [[nodiscard]] bool should_move(const ObservationFrame& frame) const;
+  [[nodiscard]] PathStep passed_over(const ObservationFrame& frame);
   [[nodiscard]] FrameEvent come_to(const ObservationFrame& frame);
   void add_new(const ObservationFrame& frame);
   void enter_known(const ObservationFrame& frame);
@@ -83,8 +87,10 @@ class ObservationLocalizer {
   UsualGap gap_;                      ///< Between frames; where their period is not given.
   double t_s_ = 0.0;                  ///< Of the last frame.
   std::size_t num_taken_ = 0;         ///< Frames.
-  std::size_t num_left_ = 0;          ///< Times that a point left a full filter.
-  int num_elsewhere_ = 0;             ///< Frames in a row in which the target says that the camera is somewhere else.
+  std::vector<FeatureObservation> last_seen_;
+  std::size_t num_repeated_ = 0;  ///< Frames that showed the last one again.
+  std::size_t num_left_ = 0;      ///< Times that a point left a full filter.
+  int num_elsewhere_ = 0;         ///< Frames in a row in which the target says that the camera is somewhere else.
 };
 
 }  // namespace alidade

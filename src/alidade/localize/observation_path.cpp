@@ -45,6 +45,7 @@ std::optional<ObservationLocalizer::Solution> ObservationLocalizer::solved(Local
 void ObservationLocalizer::sum_up(Localization& result) const {
   const LocalizeTarget& target = config_.target;
   result.sigma_px = config_.filter.sigma_px;
+  result.num_repeated = num_repeated_;
   result.is_board = target.board.has_value();
   std::optional<Solution> solution;
   if (config_.smooths) solution = solved(result);

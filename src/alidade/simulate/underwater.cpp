@@ -100,7 +100,9 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
   sequence.given_start = {(first.rotation * exp_so3(turn)).normalized(),
                           first.translation + scene.sigma_position_m * draws.normal3()};
   for (int k = 0; k < scene.num_frames; ++k) {
-    UnderwaterFrame frame{k * scene.dt_s, swing.world_from_cam(k * scene.dt_s), {}};
+    const int num_missing = scene.missing_every > 1 ? k / (scene.missing_every - 1) : 0;
+    const double taken_s = (k + num_missing) * scene.dt_s;
+    UnderwaterFrame frame{k * scene.dt_s, swing.world_from_cam(taken_s), {}};
     const bool is_black = scene.blackout_s > 0.0 && frame.t_s >= scene.blackout_from_s - 1e-9 &&
                           frame.t_s < scene.blackout_from_s + scene.blackout_s - 1e-9;
     for (UnderwaterPoint& point : sequence.points) {
@@ -108,9 +110,9 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
       const double depth_error = draws.normal(), is_wrong = draws.uniform();
       const double v = draws.uniform(-1.0, 1.0), u = draws.uniform(-1.0, 1.0);
       Eigen::Vector3d point_in_world = point.point_in_world;
-      if (point.id <= static_cast<long>(vertices.size())) point_in_world.x() += scene.target_speed_m_s * frame.t_s;
+      if (point.id <= static_cast<long>(vertices.size())) point_in_world.x() += scene.target_speed_m_s * taken_s;
       const Eigen::Vector3d point_in_cam = frame.world_from_cam.inverse() * point_in_world;
-      const auto px = rolling_px(scene, swing, frame.t_s - scene.late_s, point_in_world);
+      const auto px = rolling_px(scene, swing, taken_s - scene.late_s, point_in_world);
       if (is_black || !px || !is_between_pixels(scene.camera, *px)) continue;
       // A prior of 30 % may draw a point behind the camera: no one believes that.
       if (point.given_depth_m == 0.0)

@@ -27,8 +27,9 @@ struct UnderwaterScene {
   double mismatch_px = 60.0;  ///< How far at most, in each coordinate.
   double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Nothing is seen from then on for so long.
   // What differs from the filter's assumptions.
-  double readout_s = 0.0;         ///< From an image's first row to its last; its time is that of the central one.
-  double late_s = 0.0;            ///< Images are taken so long before the time that they bear.
+  double readout_s = 0.0;  ///< From an image's first row to its last; its time is that of the central one.
+  double late_s = 0.0;     ///< Images are taken so long before the time that they bear.
+  int missing_every = 0;   ///< Of so many frames the last is missing, and those behind it are timed as if none were.
   double target_speed_m_s = 0.0;  ///< Of the board along its x, against the other points.
   double target_stretch = 0.0;    ///< Known points are given so much (relative) further apart along x.
 };
@@ -44,8 +45,8 @@ struct UnderwaterObservation {
 };
 
 struct UnderwaterFrame {
-  double t_s = 0.0;
-  Rigid3 world_from_cam;  ///< The truth.
+  double t_s = 0.0;       ///< That it bears.
+  Rigid3 world_from_cam;  ///< The truth, when it was taken.
   std::vector<UnderwaterObservation> observations;
 };
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "alidade/localize/checks/judge.h"
+#include "alidade/localize/checks/missing_frames.h"
 #include "alidade/localize/path/path_doubt.h"
 
 namespace alidade {
@@ -247,8 +248,9 @@ void add_losses(const Localization& report, Verdict& verdict) {
   if (report.num_repeated > 0)
     verdict.checks.push_back({"repeated images", State::care,
                               std::to_string(report.num_repeated) +
-                                  " images are the one before them once more, byte for byte, while the camera moves, "
-                                  "as of a stream that hangs: there the pose is predicted",
+                                  (report.is_of_images ? " images are the one before them once more, byte for byte,"
+                                                       : " frames are the one before them once more, to all digits,") +
+                                  " while the camera moves, as of a stream that hangs: there the pose is predicted",
                               static_cast<double>(report.num_repeated), 0.0, "1", "tracks"});
   const double gated = gated_share(report);
   verdict.checks.push_back({"gated", state_of(gated, 0.05, bad_gated),
@@ -304,8 +306,9 @@ void add_restarts(const Localization& report, Verdict& verdict) {
 
 /// Of a path, in the order in which its report has them.
 void add_checks(const Localization& report, Verdict& verdict) {
-  for (const auto add : {add_innovations, add_losses, add_frame, add_masks, add_restarts, add_sensors, add_imu,
-                         add_given, add_radial, add_residuals, add_filter_alone, add_tilt, add_side, add_truth})
+  for (const auto add :
+       {add_innovations, add_losses, add_missing, add_frame, add_masks, add_restarts, add_sensors, add_imu, add_given,
+        add_radial, add_residuals, add_filter_alone, add_tilt, add_side, add_truth})
     add(report, verdict);
 }
 

@@ -36,6 +36,7 @@ class Solver {
     BundleSolution solution;
     double cost = cost_at(state_);
     double damping = 1e-4;
+    int num_settled = 0;
     for (int i = 0; i < config_.max_iterations && std::isfinite(cost); ++i) {
       report_progress(progress, "adjust", static_cast<std::size_t>(i),
                       static_cast<std::size_t>(config_.max_iterations));
@@ -50,9 +51,13 @@ class Solver {
         if (moved) state_ = next;
         damping = moved ? std::max(damping * 0.1, 1e-12) : damping * 10.0;
       }
-      // Nothing lowers the cost any more: the bottom, but for rounding.
+      // Nothing lowers the cost any more: the bottom, but for rounding; or for a point that hardly anything determines
+      // and that goes on along its Huber cost, of which nothing else takes notice.
+      constexpr double hardly = 1e-3;  // of χ²: 0.03σ
+      constexpr int enough = 3;        // times in a row
       const double gain = cost - next_cost;
-      if (!moved || gain < 1e-9 * (1.0 + cost)) {
+      num_settled = gain < hardly ? num_settled + 1 : 0;
+      if (!moved || gain < 1e-9 * (1.0 + cost) || num_settled == enough) {
         solution.converged = true;
         if (moved) cost = next_cost;
         break;

@@ -138,6 +138,8 @@ ExitCode simulate_video(const SimulateRotationArgs& args, const RotationScene& s
   const RotationFaults faults = faults_of(args);
   if (faults.are_of_rotation() && log.source != RotationSource::head)
     throw UsageError("errors of the angles are of a head's: --source head");
+  if (faults.missing_every > 0 || faults.repeated_every > 0)
+    throw UsageError("--missing-every, --repeated-every: of a log of points, without --video");
   add_faults(faults, scene.width_px, scene.height_px, run.options.seed, log);
   PanoramaConfig panorama = args.panorama;
   panorama.moving_share = faults.moving_share;
@@ -275,6 +277,11 @@ void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
   add_number(command, "--line-time", args.shutter_s, "Rolling shutter: last row after the first [s]", -0.2, 0.2);
   add_number(command, "--clock-rate", args.clock_rate, "The images' clock over the rotation's, less one", -0.1, 0.1);
   add_number(command, "--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
+  const auto every = [&](const char* name, int& value, const char* help) {
+    command.add_option(name, value, help)->check(CLI::Range(0, 100000))->capture_default_str();
+  };
+  every("--missing-every", faults.missing_every, "Of so many images the last is missing, the others numbered through");
+  every("--repeated-every", faults.repeated_every, "Of so many images the last is the one before it once more");
   add_number(command, "--wrong", faults.wrong_share, "Share of pixels that are anywhere; of wrong matches in pairs.csv",
              0.0, 0.95);
   add_number(command, "--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "alidade/observe/checks/frame_places.h"
 #include "alidade/observe/solve/solve.h"
 #include "alidade/observe/solve/solve_once.h"
 
@@ -70,6 +71,42 @@ ObserveReport judged_observation(ObserveSolution solution, RotationLog log, cons
   return std::move(static_cast<ObserveReport&>(solution));
 }
 
+std::size_t num_zooms(const ObserveSolution& solution) {
+  return static_cast<std::size_t>(std::ranges::count_if(solution.events, [](const ObserveNote& note) {
+    return note.event == ObserveEvent::zoom || note.event == ObserveEvent::restart;
+  }));
+}
+
+/// How much is taken to explain the pixels beside one camera.
+std::size_t num_explained_by(const ObserveSolution& solution) {
+  return static_cast<std::size_t>(CommonLayout(solution.estimated).size) + solution.estimated_errors.size() +
+         num_zooms(solution) + (solution.mounting_step ? 3 : 0);
+}
+
+/// Images in the rows of their time leave less, or as much with fewer causes: zooms, a delay or a bump explain a part
+/// of what a gap does. An image that is there twice is none, whatever it leaves.
+bool is_better(const ObserveSolution& solution, const ObserveSolution& as_given, const FramePlaces& places) {
+  constexpr double less = 0.8, as_much = 1.1;
+  const auto is_answer = [](const ObserveSolution& each) { return each.status == ObserveSolution::Status::ok; };
+  if (!is_answer(solution) || !is_answer(as_given)) return is_answer(solution);
+  if (places.missing.empty() || solution.sigma_px < less * as_given.sigma_px) return true;
+  constexpr std::size_t fewer = 2;  // of a head that stops and goes a delay alone, or a gap before it first moved
+  return solution.sigma_px < as_much * as_given.sigma_px &&
+         num_explained_by(solution) + fewer <= num_explained_by(as_given);
+}
+
+/// Frames that were dropped, or are there twice: the images in the rows of their time.
+void heed_places(const ObserveSetup& setup, const Progress& progress, RotationLog& log, ObserveSolution& solution) {
+  const FramePlaces places = frame_places(log);
+  if (places.are_as_given()) return;
+  RotationLog moved = placed(log, places);
+  ObserveSolution again = solve_intrinsics(moved, setup, progress);
+  if (!is_better(again, solution, places)) return;
+  again.side_checks.push_back(places_check(log, places));
+  solution = std::move(again);
+  log = std::move(moved);
+}
+
 }  // namespace
 
 ObserveReport observe(RotationLog log, const ObserveConfig& config, const Progress& progress) {
@@ -84,6 +121,7 @@ ObserveReport observe(RotationLog log, const ObserveConfig& config, const Progre
     for (RotationRow& row : log.rows) undistort(*setup.camera, Eigen::Vector2d::Constant(not_seen), row.px);
   }
   ObserveSolution solution = solve_intrinsics(log, setup, progress);
+  if (setup.rotation == RotationKnowledge::known) heed_places(setup, progress, log, solution);
   return judged_observation(std::move(solution), std::move(log), setup);
 }
 

@@ -58,6 +58,8 @@ struct RotationFaults {
   double swapped_share = 0.0;                       ///< Pixels exchanged with another point's.
   double moving_share = 0.0;  ///< Points that move through the image, by a few pixels a second, up to 20.
   double noise_px = 0.0, noise_lasts_s = 0.0;  ///< Noise of each track beside the white one, and how long it lasts.
+  int missing_every = 0;  ///< Of so many images the last is missing, and those behind it are numbered through. 0: none.
+  int repeated_every = 0;  ///< Of so many images the last is the one before it once more. 0: none.
 
   [[nodiscard]] bool are_of_rotation() const;
 };

@@ -66,6 +66,20 @@ void mix_up(const RotationFaults& faults, int width_px, int height_px, Draws& dr
   }
 }
 
+/// Rows that have no image any more are left out.
+void drop_images(int every, RotationLog& log) {
+  const auto kept = static_cast<std::size_t>(every - 1);
+  std::size_t num = 0;
+  for (; num + num / kept < log.rows.size(); ++num) log.rows[num].px = log.rows[num + num / kept].px;
+  log.rows.resize(num);
+  if (!log.truth.empty()) log.truth.resize(num);
+}
+
+void repeat_images(int every, RotationLog& log) {
+  for (std::size_t k = 1; k < log.rows.size(); ++k)
+    if ((k + 1) % static_cast<std::size_t>(every) == 0) log.rows[k].px = log.rows[k - 1].px;
+}
+
 }  // namespace
 
 bool RotationFaults::are_of_rotation() const {
@@ -83,6 +97,8 @@ void add_faults(const RotationFaults& faults, int width_px, int height_px, std::
   if (faults.moving_share > 0.0) move_points(faults, draws, log);
   if (faults.noise_px > 0.0) add_lasting_noise(faults, draws, log);
   if (faults.wrong_share > 0.0 || faults.swapped_share > 0.0) mix_up(faults, width_px, height_px, draws, log);
+  if (faults.repeated_every > 1) repeat_images(faults.repeated_every, log);
+  if (faults.missing_every > 1) drop_images(faults.missing_every, log);
 }
 
 }  // namespace alidade

@@ -1,0 +1,112 @@
+#include "alidade/observe/checks/frame_places.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/observe.h"
+#include "alidade/simulate/draws.h"
+#include "alidade/simulate/rotation.h"
+#include "alidade/testing/trials.h"
+
+// Images that were dropped, or are there twice, beside the angles of a head.
+
+namespace alidade {
+namespace {
+
+constexpr int width = 640, height = 480;
+constexpr double true_f = 500.0;
+
+/// Four seconds of a head that sways, 30 images a second.
+RotationLog log_of(std::uint64_t seed, const RotationFaults& faults = {}, double delay_s = 0.0, double zoom = 1.0) {
+  Draws draws(9000 + seed);
+  RotationScene scene;
+  scene.width_px = width;
+  scene.height_px = height;
+  scene.start_px = draw_points(width, height, 40, 100 + seed);
+  scene.intrinsics = [zoom](double t_s) {
+    const double f = true_f * (t_s < 2.0 ? 1.0 : zoom);
+    return RotatingIntrinsics{f, f, 320.0, 240.0};
+  };
+  scene.delay_s = delay_s;
+  const double rate = draws.uniform(1.0, 1.6), other = draws.uniform(1.4, 2.4), phase = draws.uniform(0.0, 6.28);
+  scene.motion = [=](double t_s) {
+    return Eigen::Vector3d(14.0 * degree * std::sin(rate * t_s), 8.0 * degree * std::sin(other * t_s + phase), 0.0);
+  };
+  RotationLogConfig config;
+  config.source = RotationSource::head;
+  config.duration_s = 4.0;
+  config.rate_hz = 30.0;
+  config.sigma_px = 0.3;
+  config.clip_to_image = true;
+  RotationLog log = simulate_rotation(scene, config, seed);
+  log.sigma_parallax = 0.0;
+  add_faults(faults, width, height, seed, log);
+  return log;
+}
+
+/// Of images that are left from so many rows.
+void drop(RotationLog& log, std::size_t before, std::size_t num) {
+  for (std::size_t k = before; k + num < log.rows.size(); ++k) log.rows[k].px = log.rows[k + num].px;
+  log.rows.resize(log.rows.size() - num);
+  if (!log.truth.empty()) log.truth.resize(log.rows.size());
+}
+
+ObserveReport observed(const RotationLog& log) {
+  ObserveConfig config;
+  config.width_px = width;
+  config.height_px = height;
+  return observe(log, config);
+}
+
+TEST(FramePlaces, MissingImagesAreNamedAndTheOthersPutInTheirRows) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    RotationLog log = log_of(seed);
+    drop(log, 70, 3);
+    drop(log, 40, 1);
+    const FramePlaces places = frame_places(log);
+    ASSERT_EQ(places.missing.size(), 2u) << seed;
+    EXPECT_EQ(places.missing[0].before, 40u);
+    EXPECT_EQ(places.missing[0].num, 1);
+    EXPECT_EQ(places.missing[1].before, 69u);
+    EXPECT_EQ(places.missing[1].num, 3);
+    EXPECT_TRUE(places.repeated.empty());
+    const ObserveReport report = observed(log);
+    EXPECT_EQ(report.verdict.state, State::care) << seed;
+    EXPECT_NE(report.verdict.to_add.find("4 frames are missing"), std::string::npos) << report.verdict.to_add;
+    EXPECT_NEAR(report.quantities[0].value, true_f, 5.0 * report.quantities[0].sigma) << seed;
+    EXPECT_LT(report.quantities[0].sigma, 0.005 * true_f) << seed;
+    for (const ObserveNote& note : report.events) EXPECT_NE(note.event, ObserveEvent::zoom) << seed;
+  }
+}
+
+TEST(FramePlaces, ImagesThatAreThereTwiceAreLeftOut) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const RotationLog log = log_of(seed, {.repeated_every = 25});
+    const FramePlaces places = frame_places(log);
+    EXPECT_TRUE(places.missing.empty()) << seed;
+    EXPECT_GE(places.repeated.size(), 3u) << seed;
+    for (const std::size_t row : places.repeated) EXPECT_EQ(row % 25, 24u) << seed;
+    const ObserveReport report = observed(log);
+    EXPECT_EQ(report.verdict.state, State::care) << seed;
+    EXPECT_NE(report.verdict.to_add.find("the one before once more"), std::string::npos) << report.verdict.to_add;
+    EXPECT_NEAR(report.quantities[0].value, true_f, 5.0 * report.quantities[0].sigma) << seed;
+  }
+}
+
+/// A delay, play in the gears, or a zoom moves many steps a little, or the image otherwise.
+TEST(FramePlaces, NothingIsMissingOfOtherCauses) {
+  const auto num_seeds = static_cast<std::uint64_t>(testing::trials(10));
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    EXPECT_TRUE(frame_places(log_of(seed)).are_as_given()) << seed;
+    EXPECT_TRUE(frame_places(log_of(seed, {}, 0.05)).are_as_given()) << seed;
+    EXPECT_TRUE(frame_places(log_of(seed, {}, -0.05)).are_as_given()) << seed;
+    EXPECT_TRUE(frame_places(log_of(seed, {.backlash_rad = 0.3 * degree})).are_as_given()) << seed;
+    EXPECT_TRUE(frame_places(log_of(seed, {.wrong_share = 0.1})).are_as_given()) << seed;
+    EXPECT_TRUE(frame_places(log_of(seed, {}, 0.0, 1.3)).are_as_given()) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace alidade

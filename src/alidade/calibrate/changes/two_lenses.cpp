@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr std::size_t min_views = 10, min_beside = 3;
+constexpr std::size_t fewest_views = 10, min_beside = 3;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// What each view says of a change of the lens along a direction, alone and to first order, and how surely.
@@ -137,7 +137,8 @@ std::optional<TwoLenses> two_lenses(const Board& board, std::span<const BoardVie
                                     std::span<const ViewScore> scores, CalibrateConfig config,
                                     const CalibrateReport& report) {
   constexpr std::size_t most = 120;
-  if (views.size() < min_views || scores.size() != views.size() || !is_central(report.camera.lens)) return std::nullopt;
+  if (views.size() < fewest_views || scores.size() != views.size() || !is_central(report.camera.lens))
+    return std::nullopt;
   config.board_shape = BoardShape::given;
   const std::size_t stride = 1 + (views.size() - 1) / most;
   std::vector<BoardView> some;

@@ -1,7 +1,9 @@
 #include "alidade/calibrate/calibration.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
+#include <string_view>
 #include <utility>
 
 #include "alidade/calibrate/changes/lens_change.h"
@@ -93,15 +95,26 @@ std::optional<TwoLenses> find_two_lenses(std::span<const ViewScore> scores, cons
   return two_lenses(result.board, views, scores, result.config, result);
 }
 
-/// Names why the photos disagree: two lenses, or a centre or a focal length that each photo has its own of. A change of
-/// the focal length over them goes before, but where it is the centre that differs there is none.
+/// Whether the verdict has a cause already, of which photos disagree as well.
+bool has_a_cause(const Calibration& result) {
+  if (!result.study.print_error.empty() || !result.study.lens_error.empty()) return true;
+  constexpr std::array<std::string_view, 4> causes{"mirrored", "board flat", "principal point", "one lens"};
+  return std::ranges::any_of(result.verdict.checks, [&](const Check& check) {
+    return check.state != State::good && std::ranges::find(causes, check.name) != causes.end();
+  });
+}
+
+/// Names why the photos disagree: two lenses, or a centre or a focal length that each photo has its own of. A change
+/// over the photos goes before, but for one of the focal length where it is the centre that differs.
 void explain_disagreement(std::span<const ViewScore> scores, const LensChangeStudy& change, Calibration& result) {
   const bool changes = change.change && change.change->is_proved;
   std::vector<std::string> photos;
   const auto two = changes ? std::nullopt : find_two_lenses(scores, result, photos);
   if (two) return heed_two_lenses(*two, photos, result.verdict);
+  if (has_a_cause(result)) return;
   const auto effect = photo_effect(scores, result);
-  if (effect && (effect->is_centre || !changes)) heed_photo_effect(*effect, result.verdict);
+  const bool goes_before = effect && effect->is_centre && changes && change.change->what == LensChange::focal_length;
+  if (effect && (!changes || goes_before)) heed_photo_effect(*effect, result.verdict);
 }
 
 /// The board as solved: decides its shape, and solves again where that is not the one of the first solve.

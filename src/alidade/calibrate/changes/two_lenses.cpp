@@ -173,7 +173,7 @@ void heed_two_lenses(const TwoLenses& found, std::span<const std::string> photos
     names += (i == 0 ? "" : ", ") + photos[found.seconds[i]];
   if (found.seconds.size() > named) names += ", …";
   const auto fx_px = [](const Camera& camera) { return params(camera.lens)[0]; };
-  Check check{.name = "one lens", .state = State::bad, .unit = "1", .figure = "photos"};
+  Check check{.name = "two lenses", .state = State::bad, .unit = "1", .figure = "photos"};
   check.value = found.together_px / found.apart_px;
   check.limit = 2.5;
   check.text = fmt::format(

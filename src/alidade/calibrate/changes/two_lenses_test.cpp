@@ -38,7 +38,7 @@ std::vector<BoardView> mixed_views(double longer, const std::function<bool(std::
 }
 
 bool is_named(const Calibration& result) {
-  return std::ranges::any_of(result.verdict.checks, [](const Check& check) { return check.name == "one lens"; });
+  return std::ranges::any_of(result.verdict.checks, [](const Check& check) { return check.name == "two lenses"; });
 }
 
 TEST(TwoLenses, AreNamedWithTheirPhotos) {

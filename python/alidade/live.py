@@ -155,8 +155,10 @@ class Localizer(OneByOne):
         before the start)."""
         rows, shape = vectors(pixels, 2, "pixels")
         numbered = np.asarray(ids)
+        if numbered.dtype.kind == "f" and np.array_equal(np.trunc(numbered), numbered) and np.all(np.abs(numbered) < 2.0**53):
+            numbered = numbered.astype(np.int64)  # as of a table's column; [] is of floating numbers, too
         if numbered.shape != shape or numbered.ndim != 1 or numbered.dtype.kind not in "iu":
-            raise ValueError(f"ids: a whole number per pixel is needed, but the shape is {numbered.shape}")
+            raise ValueError(f"ids: a whole number per pixel is needed, but the shape is {numbered.shape} of {numbered.dtype}")
         step = self._begin(False).push_points(self._frame, number(t_s, "t_s"), numbered.tolist(), rows)
         self._frame += 1
         return _pose(step)

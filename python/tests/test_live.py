@@ -63,6 +63,12 @@ class Live(InFolder):
         for frame in np.unique(sights["frame"]):
             seen = sights[sights["frame"] == frame]
             step = localizer.push(seen["t_s"][0], seen["point_id"], np.stack([seen["u_px"], seen["v_px"]], axis=1))
+            if frame == 20:  # numbers of a column of floating ones; nothing seen is a frame, too
+                other = al.Localizer(files["camera"], target=files["target"], start=files["start"])
+                other.push(seen["t_s"][0], seen["point_id"].astype(float), np.stack([seen["u_px"], seen["v_px"]], axis=1))
+                self.assertEqual(other.push(seen["t_s"][0] + 1.0, [], np.zeros((0, 2)))["frame"], 1)
+                with self.assertRaises(ValueError):
+                    other.push(99.0, [1.5], [[1.0, 2.0]])
         live = localizer.finish()
         self.assertEqual(live.estimate["frames"], batch.estimate["frames"])
         np.testing.assert_allclose(live.tables["trajectory"]["x_m"], batch.tables["trajectory"]["x_m"], atol=1e-9)

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "alidade/estimation/config_error.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/loop/servo_study.h"
 
 // Loops that are called stable stay on a target at rest; those that are refused do not: over a grid of plants, gains,
@@ -139,7 +140,6 @@ TEST(ServoStability, BothAxesAreChecked) {
 /// A plant as `identify` writes it, of which the acceleration makes pi a limit cycle: an independent simulation of the
 /// drive swings by 589 px about a target at rest with 120°/s², and rests with 240°/s².
 TEST(ServoStability, ALoopThatItsLimitsKeepSwingingIsNamed) {
-  constexpr double degree = 0.017453292519943295;
   for (const bool swings : {true, false}) {
     ServoScenario scenario;
     scenario.controllers = {ControllerKind::pi};

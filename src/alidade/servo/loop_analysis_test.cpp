@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "alidade/files/files.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/servo/axis/axis_model.h"
 #include "alidade/servo/axis/axis_settling.h"
 #include "alidade/testing/reference_case.h"
@@ -132,6 +133,14 @@ TEST(LoopAnalysis, MarginsAreOfTheSampledLoopWithItsDelays) {
   }
 }
 
+ServoAxis lagging_axis(const ServoPlant& plant, double second_tau_s, double command_delay_s) {
+  ServoAxis axis;
+  axis.plant = plant;
+  axis.second_tau_s = second_tau_s;
+  axis.command_delay_s = command_delay_s;
+  return axis;
+}
+
 /// A loop endures as many periods more as its phase margin has at the crossover, and no more.
 TEST(LoopAnalysis, ThePhaseMarginIsTheDelayThatIsLeft) {
   int num_tried = 0;
@@ -139,17 +148,14 @@ TEST(LoopAnalysis, ThePhaseMarginIsTheDelayThatIsLeft) {
     for (const double second_tau_s : {0.0, 0.06}) {
       for (const double command_delay_s : {0.0, 0.02, 0.07}) {
         for (const double K : {2.0, 6.0, 12.0}) {
-          ServoAxis axis;
-          axis.plant = plant;
-          axis.second_tau_s = second_tau_s;
-          axis.command_delay_s = command_delay_s;
+          const ServoAxis axis = lagging_axis(plant, second_tau_s, command_delay_s);
           const bool is_rate = std::holds_alternative<RatePlant>(plant);
           const PiGains gains{2.0 * K, is_rate ? 0.5 * K : 10.0 * K, ErrorUnit::rad};
           const LoopAnalysis loop = analysed(axis, gains, loop_period_s);
           ASSERT_GT(loop.crossover_rad_s, 0.0);
           ASSERT_EQ(loop.phase_margin_deg > 0.0, loop.is_stable()) << K << " " << command_delay_s;
           if (!loop.is_stable()) continue;
-          const double left = loop.phase_margin_deg * 0.017453292519943295 / (loop.crossover_rad_s * loop_period_s);
+          const double left = loop.phase_margin_deg * degree / (loop.crossover_rad_s * loop_period_s);
           const int whole = static_cast<int>(left);
           EXPECT_TRUE(analysed(axis, gains, loop_period_s, whole).is_stable()) << left;
           EXPECT_FALSE(analysed(axis, gains, loop_period_s, whole + 1).is_stable()) << left;
@@ -167,10 +173,7 @@ TEST(LoopAnalysis, RadiusOfALaggingLateAxisIsThatOfTheSimulatedOne) {
   for (const ServoPlant& plant : {ServoPlant(AnglePlant{}), ServoPlant(RatePlant{})}) {
     for (const double second_tau_s : {0.0, 0.02, 0.1}) {
       for (const double command_delay_s : {0.0, 0.015, 0.08}) {
-        ServoAxis axis;
-        axis.plant = plant;
-        axis.second_tau_s = second_tau_s;
-        axis.command_delay_s = command_delay_s;
+        const ServoAxis axis = lagging_axis(plant, second_tau_s, command_delay_s);
         ServoConfig config;
         config.controller = ControllerKind::pi;
         if (std::holds_alternative<RatePlant>(plant)) config.pi = {4.0, 4.0, ErrorUnit::rad};

@@ -15,6 +15,7 @@ namespace {
 constexpr double ordinary_f = 0.003, ordinary_centre_px = 2.0, ordinary_scale = 0.005;
 constexpr double ordinary_turn_rad = 0.0017453292519943295;  // 0.1°: how well a mounting is set by hand and eye
 constexpr double ordinary_clock_s = 0.005;
+constexpr std::array<const char*, 3> coordinates{"x_m", "y_m", "z_m"};
 
 /// The step whose target is nearer than half of the others', and what the heads read about it.
 struct Median {
@@ -55,12 +56,11 @@ class Lister {
     if (head < by_.size() && by_[head].size() > 0) {
       Eigen::Vector3d moved = Eigen::Vector3d::Zero();
       for (const auto& [column, share] : columns) moved += error * share * by_[head].col(column);
-      constexpr std::array<const char*, 3> names{"x_m", "y_m", "z_m"};
       for (int i = 0; i < 3; ++i) {
         const double in_sigma = std::abs(moved[i]) / std::sqrt(median_.step->belief.P(i, i));
         if (!(in_sigma > what.moves)) continue;
         what.moves = in_sigma;
-        what.moved = names[static_cast<std::size_t>(i)];
+        what.moved = coordinates[static_cast<std::size_t>(i)];
         what.moved_by = moved[i];
       }
     }
@@ -175,12 +175,11 @@ std::optional<Assumption> angles_before_images(std::span<const TargetObservation
   if (!(num > 0.0)) return std::nullopt;
   Eigen::Index worst = 0;
   in_sigma2.maxCoeff(&worst);
-  constexpr std::array<const char*, 3> names{"x_m", "y_m", "z_m"};
   return Assumption{.name = "angles (s)",
                     .value = std::nan(""),
                     .ordinary = ordinary_delay_s,
                     .moves = std::sqrt(in_sigma2[worst] / num),
-                    .moved = names[static_cast<std::size_t>(worst)],
+                    .moved = coordinates[static_cast<std::size_t>(worst)],
                     .moved_by = std::sqrt(moved2[worst] / num),
                     .remedy = "read the angles when the images are taken, or interpolate them to these times"};
 }

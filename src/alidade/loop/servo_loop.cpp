@@ -191,6 +191,23 @@ void add_focal_errors(const ServoScene& scene, const std::vector<ServoRow>& rows
   figures.focal_z = std::sqrt(z2 / num);
 }
 
+/// 95 % are no larger, of errors in order of size.
+double p95_of(const std::vector<double>& errors) {
+  return errors[static_cast<std::size_t>(0.95 * (static_cast<double>(errors.size()) - 1.0))];
+}
+
+/// Of each head: from when on the target is out of its image, as a share of the time that counts.
+std::vector<double> gone_of(const ServoScene& scene, const std::vector<ServoRow>& rows) {
+  std::vector<double> counted(scene.heads.size(), 0.0), gone(scene.heads.size(), 0.0);
+  for (const ServoRow& row : rows) {
+    if (row.t_s < scene.warm_up_s) continue;
+    counted[row.head] += 1.0;
+    gone[row.head] = row.is_in_image ? 0.0 : gone[row.head] + 1.0;
+  }
+  for (std::size_t i = 0; i < gone.size(); ++i) gone[i] /= std::max(1.0, counted[i]);
+  return gone;
+}
+
 ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& rows) {
   ServoFigures figures;
   std::vector<double> errors;
@@ -224,8 +241,10 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
   figures.in_image = static_cast<double>(visible) / count;
   figures.unseen = static_cast<double>(waiting) / count;
   std::ranges::sort(errors);
-  figures.p95_px = errors[static_cast<std::size_t>(0.95 * (count - 1.0))];
+  figures.p95_px = p95_of(errors);
   figures.max_px = std::max(figures.max_px, errors.back());
+  figures.gone = gone_of(scene, rows);
+  figures.errors_px = std::move(errors);
   add_focal_errors(scene, rows, figures);
   return figures;
 }
@@ -275,7 +294,6 @@ ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint
 ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   ServoFigures all;
   if (runs.empty()) return all;
-  std::vector<double> p95;
   for (const ServoFigures& run : runs) {
     all.rms_px += run.rms_px * run.rms_px;
     all.between_px += run.between_px * run.between_px;
@@ -288,7 +306,9 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
     all.focal_z += run.focal_z * run.focal_z;
     all.unseen += run.unseen;
     all.max_px = std::max(all.max_px, run.max_px);
-    p95.push_back(run.p95_px);
+    all.errors_px.insert(all.errors_px.end(), run.errors_px.begin(), run.errors_px.end());
+    all.gone.resize(std::max(all.gone.size(), run.gone.size()), 0.0);
+    for (std::size_t i = 0; i < run.gone.size(); ++i) all.gone[i] = std::max(all.gone[i], run.gone[i]);
   }
   const auto count = static_cast<double>(runs.size());
   all.rms_px = std::sqrt(all.rms_px / count);
@@ -298,8 +318,8 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   all.central_third /= count;
   all.in_image /= count;
   all.unseen /= count;
-  std::ranges::sort(p95);
-  all.p95_px = p95[p95.size() / 2];
+  std::ranges::sort(all.errors_px);
+  if (!all.errors_px.empty()) all.p95_px = p95_of(all.errors_px);
   return all;
 }
 

@@ -83,8 +83,11 @@ struct ServoFigures {
   std::size_t num_found = 0;   ///< …and found again.
   double search_s = 0.0;       ///< Time spent searching, all heads.
   double unseen = 0.0;         ///< Share of the time in which a head has not yet seen the target.
-  double focal_share = 0.0;    ///< RMS error of fx as the loop has it, over the true one.
-  double focal_z = 0.0;        ///< The same over its σ; 0 where it states none.
+  /// Of each head: the share of the time, at its end, in which the target is no more in its image.
+  std::vector<double> gone;
+  std::vector<double> errors_px;  ///< Of which `p95_px` is the 95 % quantile, in order of size.
+  double focal_share = 0.0;       ///< RMS error of fx as the loop has it, over the true one.
+  double focal_z = 0.0;           ///< The same over its σ; 0 where it states none.
 };
 
 struct ServoRun {
@@ -97,7 +100,8 @@ struct ServoRun {
 [[nodiscard]] ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed,
                                  const std::function<void(const ServoRow&)>& watch = {});
 
-/// RMS of all runs, the largest of the runs' maxima, median of their 95 %, means of the shares, sums of the counts.
+/// RMS of all runs, the largest of the runs' maxima and of what each head is without the target at the end, 95 % of all
+/// errors, means of the other shares, sums of the counts.
 [[nodiscard]] ServoFigures put_together(const std::vector<ServoFigures>& runs);
 
 /// RMS over factors on gain and time constant, gain by gain: rms_px[gain · num_tau + tau].

@@ -248,6 +248,57 @@ TEST(ServoStudy, ErrorsBetweenTheImagesCount) {
   EXPECT_NE(verdict.sentence.find("between the images"), std::string::npos) << verdict.sentence;
 }
 
+/// Half of two heads' time in the image may be one that has lost the target.
+TEST(ServoStudy, AHeadThatLosesTheTargetForGoodIsNamed) {
+  const ServoScenario scenario;
+  const auto verdict_of = [&](double first, double second) {
+    ServoComparison best{};
+    best.controller = ControllerKind::lqr;
+    best.figures.in_image = 0.7;
+    best.figures.gone = {first, second};
+    ServoStudy study;
+    study.best = best.controller;
+    study.comparison.push_back(best);
+    return servo_verdict(scenario, study);
+  };
+  const Verdict lost = verdict_of(0.0, 0.6);
+  EXPECT_EQ(lost.state, State::bad);
+  EXPECT_NE(lost.sentence.find("head 2 loses the target for good"), std::string::npos) << lost.sentence;
+  EXPECT_EQ(lost.sentence.find("head 1"), std::string::npos) << lost.sentence;
+  EXPECT_EQ(verdict_of(0.0, 0.1).state, State::care);
+}
+
+/// A target that is aside of the heads' stops from 6 s on, of the 2 to 12 s that count.
+TEST(ServoLoop, FiguresSayHowLongAHeadIsWithoutTheTarget) {
+  ServoScene scene = xiahou_servo_scene();
+  const Eigen::Vector3d start_m = scene.path.start_m, aside_m = start_m + Eigen::Vector3d(50.0, 0.0, 0.0);
+  scene.path.kind = PathKind::recorded;
+  scene.path.recorded_s = {0.0, 5.9, 6.0, 6.1, 12.0};
+  scene.path.recorded_m = {start_m, start_m, 0.5 * (start_m + aside_m), aside_m, aside_m};
+  ServoConfig config;
+  config.controller = ControllerKind::lqr;
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e9), high = -low;
+  for (const ServoRow& row : run_servo(scene, config, 1).rows) {
+    if (row.t_s > 5.0) break;
+    low = low.cwiseMin(row.measured_rad);
+    high = high.cwiseMax(row.measured_rad);
+  }
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    scene.axes[axis].min_rad = low[static_cast<Eigen::Index>(axis)] - 0.2;
+    scene.axes[axis].max_rad = high[static_cast<Eigen::Index>(axis)] + 0.2;
+  }
+  for (const double gone : run_servo(scene, config, 1).figures.gone) EXPECT_NEAR(gone, 0.6, 0.02);
+}
+
+TEST(ServoStudy, NinetyFivePercentAreThoseOfAllTrials) {
+  std::vector<ServoFigures> runs(20);
+  for (std::size_t i = 0; i < runs.size(); ++i) {  // one in ten trials is far off
+    runs[i].errors_px.assign(100, i < 18 ? 1.0 : 50.0);
+    runs[i].p95_px = i < 18 ? 1.0 : 50.0;
+  }
+  EXPECT_EQ(put_together(runs).p95_px, 50.0);
+}
+
 TEST(ServoStudy, TheFarthestIsThatOfAllTrials) {
   ServoScenario scenario;
   scenario.controllers = {ControllerKind::lqr};

@@ -129,6 +129,17 @@ void add_loop_checks(const ServoScenario& scenario, const ServoStudy& study, Ver
   }
 }
 
+/// Heads that lose the target for good; empty: none.
+std::string gone_text(const ServoFigures& figures) {
+  constexpr double for_good = 0.25;
+  std::string text;
+  for (std::size_t i = 0; i < figures.gone.size(); ++i)
+    if (figures.gone[i] > for_good)
+      text += (text.empty() ? "head " : ", head ") + std::to_string(i + 1) + " loses the target for good (the last " +
+              text_of(100.0 * figures.gone[i], 2) + " % of the time without it)";
+  return text;
+}
+
 void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict& verdict) {
   const ServoFigures& best = best_of(study).figures;
   const auto add = [&](const char* name, bool is_good, std::string text, double value, double limit, const char* unit) {
@@ -335,6 +346,11 @@ Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {
   if (best.in_image < 0.5) {
     verdict.state = State::bad;
     verdict.sentence += "; in the image " + text_of(100.0 * best.in_image) + " % of the time only";
+    return verdict;
+  }
+  if (const std::string gone = gone_text(best); !gone.empty()) {
+    verdict.state = State::bad;
+    verdict.sentence += "; " + gone;
     return verdict;
   }
   const auto own = std::ranges::find(study.loops, study.best, &LoopCheck::controller);

@@ -85,7 +85,7 @@ servo.yaml  text  the plant, as a scenario of `alidade servo` takes it
 controllers.*.
   rms_px         px     of the target from the image's centre
   between_px     px     the same at thirds of the periods, between two images
-  p95_px         px     95 % are nearer, median of the trials
+  p95_px         px     95 % are nearer, of all trials' periods
   max_px         px     the farthest of all trials, between two images too
   central_third  1      share of the time in the central third
   in_picture     1      share of the time in the image

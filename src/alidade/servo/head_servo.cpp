@@ -88,25 +88,26 @@ ServoEvent HeadServo::follow(const HeadServoInput& input) {
   return ServoEvent::lost;
 }
 
-void HeadServo::ask_for_target(double t_effect_s, std::array<AxisInput, 2>& inputs) const {
-  const std::array<Bearing, 2> bearings = filter_.at(t_effect_s);
+void HeadServo::ask_for_target(double now_s, std::array<AxisInput, 2>& inputs) const {
   for (std::size_t axis = 0; axis < 2; ++axis) {
+    const Bearing bearing = filter_.at(now_s + config_.axes[axis].command_delay_s)[axis];
     auto& wanted = inputs[axis].wanted_rad.emplace();
     for (int i = 0; i <= mpc_horizon; ++i) {
-      const Bearing there = ahead(bearings[axis], config_.filter.singer_tau_s, i * config_.period_s);
+      const Bearing there = ahead(bearing, config_.filter.singer_tau_s, i * config_.period_s);
       wanted[i] = there.angle_rad;
       inputs[axis].wanted_rate_rad_s[i] = there.rate_rad_s;
     }
   }
 }
 
-void HeadServo::ask_for_search(double t_effect_s, std::array<AxisInput, 2>& inputs) const {
+void HeadServo::ask_for_search(double now_s, std::array<AxisInput, 2>& inputs) const {
   for (AxisInput& input : inputs) input.wanted_rad.emplace();
-  for (int i = 0; i <= mpc_horizon; ++i) {
-    const Eigen::Vector2d there = search_.at(t_effect_s + i * config_.period_s);
-    const Eigen::Vector2d next = search_.at(t_effect_s + (i + 1) * config_.period_s);
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const auto k = static_cast<Eigen::Index>(axis);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto k = static_cast<Eigen::Index>(axis);
+    const double t_effect_s = now_s + config_.axes[axis].command_delay_s;
+    for (int i = 0; i <= mpc_horizon; ++i) {
+      const Eigen::Vector2d there = search_.at(t_effect_s + i * config_.period_s);
+      const Eigen::Vector2d next = search_.at(t_effect_s + (i + 1) * config_.period_s);
       (*inputs[axis].wanted_rad)[i] = there[k];
       inputs[axis].wanted_rate_rad_s[i] = (next[k] - there[k]) / config_.period_s;
     }
@@ -118,11 +119,10 @@ HeadServoOutput HeadServo::step(const HeadServoInput& input) {
   output.event = follow(input);
   const bool has_target = filter_.has_started();
   std::array<AxisInput, 2> inputs;
-  const double t_effect_s = input.t_s + config_.axes[0].command_delay_s;
   if (has_target && !is_lost_)
-    ask_for_target(t_effect_s, inputs);
+    ask_for_target(input.t_s, inputs);
   else if (has_target && config_.search.enabled)
-    ask_for_search(t_effect_s, inputs);
+    ask_for_search(input.t_s, inputs);
   output.asked_rad = input.encoder_rad;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto k = static_cast<Eigen::Index>(axis);

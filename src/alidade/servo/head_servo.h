@@ -51,8 +51,9 @@ class HeadServo {
   ObservationUse take(const HeadObservation& observation);
   [[nodiscard]] std::array<LensEffect, 2> lens_effects(const HeadObservation& observation) const;
   ServoEvent follow(const HeadServoInput& input);
-  void ask_for_target(double t_effect_s, std::array<AxisInput, 2>& inputs) const;
-  void ask_for_search(double t_effect_s, std::array<AxisInput, 2>& inputs) const;
+  /// Where it, or the search, is when a command of now acts, on each axis after its own delay.
+  void ask_for_target(double now_s, std::array<AxisInput, 2>& inputs) const;
+  void ask_for_search(double now_s, std::array<AxisInput, 2>& inputs) const;
 
   RigHead head_;
   ServoConfig config_;

@@ -88,6 +88,31 @@ TEST(HeadServo, AllocatesNothing) {
   }
 }
 
+/// Of a target that rises at a steady rate the tilt axis asks for where it is when its own command acts: 0.2 s later,
+/// whatever the pan axis' delay is.
+TEST(HeadServo, EachAxisHasItsOwnDelay) {
+  constexpr double delay_s = 0.2, rate_rad_s = 0.2;
+  for (const double pan_delay_s : {0.0, delay_s}) {
+    ServoConfig config;
+    config.controller = ControllerKind::lqr;
+    for (ServoAxis& axis : config.axes) axis.plant = AnglePlant{};
+    config.axes[0].command_delay_s = pan_delay_s;
+    config.axes[1].command_delay_s = delay_s;
+    const RigHead head = general_head();
+    HeadServo servo(head, config);
+    HeadServoOutput output;
+    double asked_of_rad = 0.0;
+    for (int k = 0; k < 60; ++k) {
+      const double t_s = config.period_s * k;
+      const HeadServoInput input{
+          t_s, {0.0, rate_rad_s * t_s}, HeadObservation{t_s, {0.0, rate_rad_s * t_s}, centre_of(head.camera)}};
+      output = servo.step(input);
+      asked_of_rad = output.predicted_rad.y() + rate_rad_s * delay_s;
+    }
+    EXPECT_NEAR(output.asked_rad.y(), asked_of_rad, 0.1 * rate_rad_s * delay_s) << pan_delay_s;
+  }
+}
+
 /// Two heads in a period: twice the time of one, with the simulated head in it.
 TEST(Speed, HeadServoTakesLessThanFiftyMicrosecondsAStep) {
   if (!testing::times_count) GTEST_SKIP() << "a build with sanitizers, or for debugging";

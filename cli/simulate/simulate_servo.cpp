@@ -22,6 +22,7 @@ struct SimulateServoArgs {
   int commands_per_row = 1;
   double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = no_limit_deg_s, max_acceleration_deg_s2 = 1e9;
   double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0, max_command = 0.0, rate_offset_deg_s = 0.0;
+  double soft_max_rate_deg_s = 0.0;
   Mode resonance{.hz = 0.0, .damping = 0.05, .share = 1.0};
   double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
 };
@@ -45,6 +46,7 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
   scene.mode = args.resonance;
   scene.max_command = args.max_command;
   scene.rate_offset_rad_s = deg * args.rate_offset_deg_s;
+  scene.soft_max_rate_rad_s = deg * args.soft_max_rate_deg_s;
   scene.axis.command_delay_s = args.latency_s;
   scene.is_chirp = args.chirp;
   if (args.one_step) scene.steps = {1.0};
@@ -111,6 +113,11 @@ void add_servo_scenario(App& app) {
              0.0, 1e9);
   add_number(command, "--rate-offset-deg-s", args->rate_offset_deg_s,
              "It turns by so much beside what it is commanded, as of a neutral that is off [deg/s]", -90.0, 90.0);
+  add_number(command, "--soft-max-rate-deg-s", args->soft_max_rate_deg_s,
+             "A rate r of the lag, or of a command, becomes r / (1 + r / this), as of a motor whose force falls with "
+             "its rate; 0: "
+             "no such thing [deg/s]",
+             0.0, 1e6);
   add_number(command, "--backlash-deg", args->backlash_deg,
              "Play between what drives the axis and the angle that is read", 0.0, 90.0);
   add_number(command, "--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);

@@ -59,6 +59,7 @@ earlier_command         -      what the axis followed until the first row's comm
 gain_difference         1      the gain is 1 + it times the stated for commands above zero, 1 − it below
 gain_drift              1      by so much of it the gain grows over the log; the stated one is its middle's
 gain_by_size            1      by so much of it the gain grows from no command to the largest; the stated one is that of half of the largest
+soft_max_rate_rad_s     rad/s  where its lag alone, or the command of a rate, would turn it at r, it turns at r / (1 + |r| / this)
 resonance_hz            Hz     natural frequency of what swings behind the drive
 resonance_damping       1      its damping ratio
 resonance_share         1      of the motion, what goes through it; the rest is rigid

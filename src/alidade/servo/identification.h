@@ -56,24 +56,27 @@ struct ServoFlaws {
   double gain_by_size = 0.0;
   double max_command = 0.0;        ///< Of an angle plant: larger commands act as it (a driver's limit, stops).
   double rate_offset_rad_s = 0.0;  ///< Of a rate plant: it turns by so much beside what it is commanded.
+  /// Where its lag alone would turn it at a rate r, or the command of a rate plant, it turns at r / (1 + |r| / this).
+  double soft_max_rate_rad_s = 0.0;
   /// What swings behind the drive: y = (1 − share) x + share q with q'' = ω² (x − q) − 2ζω q', ω / 2π its natural
   /// frequency, ζ its damping ratio. A share of one: all that is read hangs on a spring.
   double resonance_hz = 0.0, resonance_damping = 0.0, resonance_share = 0.0;
 };
-inline constexpr std::size_t num_servo_flaws = 15;
+inline constexpr std::size_t num_servo_flaws = 16;
 inline constexpr std::array<double ServoFlaws::*, num_servo_flaws> servo_flaws{
-    &ServoFlaws::max_rate_rad_s,  &ServoFlaws::max_acceleration_rad_s2,
-    &ServoFlaws::dead_band,       &ServoFlaws::backlash_rad,
-    &ServoFlaws::second_tau_s,    &ServoFlaws::clock_rate,
-    &ServoFlaws::earlier_command, &ServoFlaws::gain_difference,
-    &ServoFlaws::gain_drift,      &ServoFlaws::gain_by_size,
-    &ServoFlaws::max_command,     &ServoFlaws::rate_offset_rad_s,
-    &ServoFlaws::resonance_hz,    &ServoFlaws::resonance_damping,
-    &ServoFlaws::resonance_share};
+    &ServoFlaws::max_rate_rad_s,      &ServoFlaws::max_acceleration_rad_s2,
+    &ServoFlaws::dead_band,           &ServoFlaws::backlash_rad,
+    &ServoFlaws::second_tau_s,        &ServoFlaws::clock_rate,
+    &ServoFlaws::earlier_command,     &ServoFlaws::gain_difference,
+    &ServoFlaws::gain_drift,          &ServoFlaws::gain_by_size,
+    &ServoFlaws::max_command,         &ServoFlaws::rate_offset_rad_s,
+    &ServoFlaws::soft_max_rate_rad_s, &ServoFlaws::resonance_hz,
+    &ServoFlaws::resonance_damping,   &ServoFlaws::resonance_share};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_names{
-    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band",       "backlash_rad",      "second_tau_s",
-    "clock_rate",     "earlier_command",         "gain_difference", "gain_drift",        "gain_by_size",
-    "max_command",    "rate_offset_rad_s",       "resonance_hz",    "resonance_damping", "resonance_share"};
+    "max_rate_rad_s", "max_acceleration_rad_s2", "dead_band",           "backlash_rad", "second_tau_s",
+    "clock_rate",     "earlier_command",         "gain_difference",     "gain_drift",   "gain_by_size",
+    "max_command",    "rate_offset_rad_s",       "soft_max_rate_rad_s", "resonance_hz", "resonance_damping",
+    "resonance_share"};
 inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
     "a limit of its rate",
     "a limit of its acceleration",
@@ -87,6 +90,7 @@ inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
     "a gain that changes with the command's size",
     "a limit of the command",
     "a rate beside the command's",
+    "a rate that falls behind as it grows",
     "a resonance",
     "the resonance's damping ratio",
     "the resonance's share of the motion"};
@@ -101,6 +105,7 @@ inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/
                                                                            "of the gain over the log",
                                                                            "of the gain up to the largest command",
                                                                            "units of command",
+                                                                           "rad/s",
                                                                            "rad/s",
                                                                            "Hz",
                                                                            "of the critical",

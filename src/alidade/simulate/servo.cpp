@@ -64,18 +64,24 @@ double command_of(const ServoLogScene& scene, double t_s) {
   return scene.amplitude * std::sin(2.0 * std::numbers::pi * sweep_hz * t_s);
 }
 
-/// An axis and what swings behind it.
+/// An axis without delay, whose rate may fall behind as it grows, and what swings behind it.
 class SwingingAxis {
  public:
-  SwingingAxis(const ServoAxis& axis, const Mode& mode) : axis_(axis, {}), mode_(mode) {
+  SwingingAxis(const ServoAxis& axis, const Mode& mode, double soft_max_rate_rad_s)
+      : axis_(axis, {}), mode_(mode), soft_max_rate_rad_s_(soft_max_rate_rad_s) {
     if (mode.hz > 0.0) swinging_.emplace(mode, DriveMotion{});
   }
-  void send(double command) { axis_.send(command); }
+  void send(double command) {
+    command_ = command;
+    axis_.send(soft_max_rate_rad_s_ > 0.0 ? softened(command) : command);
+  }
   void advance(double dt_s) {
-    constexpr double longest_s = 1e-4;  // for so long the drive's motion is a line
-    const double steps = swinging_ ? std::max(1.0, std::ceil(dt_s / longest_s)) : 1.0, step_s = dt_s / steps;
+    const bool is_soft = soft_max_rate_rad_s_ > 0.0;
+    const double longest_s = is_soft ? 1e-5 : 1e-4;  // for so long the drive's motion is a line
+    const double steps = swinging_ || is_soft ? std::max(1.0, std::ceil(dt_s / longest_s)) : 1.0, step_s = dt_s / steps;
     for (double k = 0.0; k < steps; ++k) {
       const double before = axis_.motion().angle_rad;
+      if (is_soft) axis_.send(softened(command_));
       axis_.advance(step_s);
       if (!swinging_ || !(step_s > 0.0)) continue;
       const double after = axis_.motion().angle_rad, rate = (after - before) / step_s;
@@ -88,8 +94,20 @@ class SwingingAxis {
   }
 
  private:
+  /// The command towards which the lag alone turns the axis at the rate at which it does turn towards this one.
+  [[nodiscard]] double softened(double command) const {
+    const ServoAxis& axis = axis_.axis();
+    const double gain = gain_of(axis.plant);
+    if (std::holds_alternative<RatePlant>(axis.plant))
+      return command / (1.0 + std::abs(gain * command) / soft_max_rate_rad_s_);
+    const double tau_s = tau_of(axis.plant), now = axis_.motion().angle_rad;
+    const double rate = (gain * command - now) / tau_s;
+    return (now + tau_s * rate / (1.0 + std::abs(rate) / soft_max_rate_rad_s_)) / gain;
+  }
+
   DelayedAxis axis_;
   Mode mode_;
+  double soft_max_rate_rad_s_ = 0.0, command_ = 0.0;
   std::optional<Resonance> swinging_;
 };
 
@@ -212,7 +230,7 @@ std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uin
   // Commands wait here: a DelayedAxis has room for a few only.
   ServoAxis prompt = scene.axis;
   prompt.command_delay_s = 0.0;
-  SwingingAxis axis(prompt, scene.mode);
+  SwingingAxis axis(prompt, scene.mode, scene.soft_max_rate_rad_s);
   std::deque<ServoLogRow> waiting;
   std::vector<ServoLogRow> rows;
   const int per_row = std::max(1, scene.commands_per_row);

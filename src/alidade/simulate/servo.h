@@ -73,6 +73,7 @@ struct ServoLogScene {
   double low_hz = 0.1, high_hz = 3.0;                     ///< Of the chirp.
   double max_command = 0.0;                               ///< Larger ones act as it; 0: none do.
   double rate_offset_rad_s = 0.0;                         ///< It turns by so much beside what it is commanded.
+  double soft_max_rate_rad_s = 0.0;                       ///< Rates r are r / (1 + |r| / this); 0: as its lag has them.
   double zero_rad = 0.0;                                  ///< What the encoder reads at angle zero.
   double sigma_rad = 0.0008726646259971648, encoder_step_rad = 0.0;
 };

@@ -58,8 +58,9 @@ std::string servo_plant_text(const ServoFit& fit) {
     if (is_of_log) continue;  // not of the axis
     const bool is_of_a_resonance = name.starts_with("resonance");
     if (is_of_a_resonance || servo_flaws[flaw] == &ServoFlaws::max_command ||
-        servo_flaws[flaw] == &ServoFlaws::rate_offset_rad_s || servo_flaws[flaw] == &ServoFlaws::gain_difference ||
-        servo_flaws[flaw] == &ServoFlaws::gain_drift || servo_flaws[flaw] == &ServoFlaws::gain_by_size) {
+        servo_flaws[flaw] == &ServoFlaws::rate_offset_rad_s || servo_flaws[flaw] == &ServoFlaws::soft_max_rate_rad_s ||
+        servo_flaws[flaw] == &ServoFlaws::gain_difference || servo_flaws[flaw] == &ServoFlaws::gain_drift ||
+        servo_flaws[flaw] == &ServoFlaws::gain_by_size) {
       flaw_sigmas += fmt::format(", {} {:.3g} (no plant has it)", name, size);
       continue;
     }

@@ -339,43 +339,5 @@ TEST(ServoCauses, UnitsAndRoundingAreNamed) {
   EXPECT_EQ(identify_verdict(coarse, identify_servo(coarse)).state, State::care);
 }
 
-/// Estimates one flaw of these draws, and nothing else: good, and all within their σ.
-void expect_flaw(const ServoLogScene& scene, std::size_t flaw, double truth) {
-  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(testing::trials(1)); ++seed) {
-    const std::vector<ServoSample> log = log_of(scene, seed);
-    const ServoIdentification found = identify_servo(log);
-    const Verdict verdict = identify_verdict(log, found);
-    EXPECT_EQ(verdict.state, State::good) << verdict.sentence;
-    ASSERT_EQ(found.fit.freed, std::vector<std::size_t>{flaw}) << verdict.sentence;
-    EXPECT_TRUE(found.slips.empty());
-    EXPECT_LT(std::abs(found.fit.flaws.*servo_flaws[flaw] - truth), 4.0 * found.fit.flaw_sigma[flaw]);
-    for (int param = 0; param < 3; ++param) EXPECT_LT(std::abs(testing::error_in_sigma(found.fit, scene, param)), 4.0);
-  }
-}
-
-/// A driver that clips at 150 of 200: a gain that changes with the size, and a dead band, with a gain 11σ off.
-TEST(ServoCauses, ALimitOfTheCommandIsEstimated) {
-  for (const bool is_chirp : {false, true}) {
-    ServoLogScene scene = late_scene(false);
-    scene.is_chirp = is_chirp;
-    scene.duration_s = 10.0;
-    scene.max_command = 150.0;
-    expect_flaw(scene, ServoFlaw::command_limit, 150.0);
-  }
-}
-
-/// A neutral that is off: gains that differ, limits, and slips of the encoder, with a gain 7σ off.
-TEST(ServoCauses, ARateBesideTheCommandsIsEstimated) {
-  for (const bool is_chirp : {false, true}) {
-    for (const double offset_rad_s : {0.002, -0.01, 0.05}) {
-      ServoLogScene scene = late_scene(true);
-      scene.is_chirp = is_chirp;
-      scene.duration_s = 10.0;
-      scene.rate_offset_rad_s = offset_rad_s;
-      expect_flaw(scene, ServoFlaw::rate_offset, offset_rad_s);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace alidade

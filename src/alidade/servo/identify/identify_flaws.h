@@ -24,6 +24,7 @@ struct ServoFlaw {
     gain_by_size,
     command_limit,
     rate_offset,
+    soft_rate_limit,
     resonance,  ///< Its frequency; the next two go with it.
     resonance_damping,
     resonance_share
@@ -70,6 +71,9 @@ inline constexpr std::size_t num_of_a_resonance = 3;
 [[nodiscard]] constexpr bool is_of_the_log(std::size_t flaw) {
   return flaw == ServoFlaw::clock_rate || flaw == ServoFlaw::earlier_command;
 }
+
+/// The largest command, whatever its sign.
+[[nodiscard]] double largest_command(std::span<const ServoSample> log);
 
 /// Angles that a servo of this fit, with its flaws, reads at the times of the log. In closed form, but for a second
 /// lag, which is stepped through.

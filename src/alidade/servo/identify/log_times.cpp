@@ -85,8 +85,8 @@ void count_clock_rate(double sigma_clock, ServoFit& fit) {
   const ServoParams moved = sigma_clock * by_clock_rate(fit);
   fit.cov += moved * moved.transpose();
   for (const std::size_t flaw : fit.freed) {
-    const bool is_of_time =
-        flaw == ServoFlaw::rate_limit || flaw == ServoFlaw::second_lag || flaw == ServoFlaw::rate_offset;
+    const bool is_of_time = flaw == ServoFlaw::rate_limit || flaw == ServoFlaw::second_lag ||
+                            flaw == ServoFlaw::rate_offset || flaw == ServoFlaw::soft_rate_limit;
     const double power = flaw == ServoFlaw::acceleration_limit        ? 2.0
                          : is_of_time || flaw == ServoFlaw::resonance ? 1.0
                                                                       : 0.0;

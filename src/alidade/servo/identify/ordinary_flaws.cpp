@@ -19,12 +19,6 @@ struct Ordinary {
   double sigma;
 };
 
-double largest_command(std::span<const ServoSample> log) {
-  double most = 0.0;
-  for (const ServoSample& row : log) most = std::max(most, std::abs(row.command));
-  return most;
-}
-
 bool is_freed(const ServoFit& fit, double ServoFlaws::*flaw) {
   return std::ranges::any_of(fit.freed, [&](std::size_t each) { return servo_flaws[each] == flaw; });
 }

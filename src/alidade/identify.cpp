@@ -93,6 +93,32 @@ Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
   return clock;
 }
 
+/// What is counted in several parts, such as a wave by its sine and cosine, as one.
+std::vector<CountedFlaw> by_name(const std::vector<CountedFlaw>& counted) {
+  std::vector<CountedFlaw> flaws;
+  for (const CountedFlaw& each : counted) {
+    if (flaws.empty() || flaws.back().name != each.name)
+      flaws.push_back(each);
+    else
+      flaws.back().moves = (flaws.back().moves.cwiseAbs2() + each.moves.cwiseAbs2()).cwiseSqrt();
+  }
+  return flaws;
+}
+
+/// A flaw that is counted, and what of the plant it moves most.
+Assumption assumed_flaw(const ServoFit& fit, const CountedFlaw& counted) {
+  Assumption flaw{.name = counted.name, .value = 0.0, .sigma = counted.sigma, .moved = "gain_rad"};
+  flaw.remedy = counted.remedy;
+  for (const int param : {ServoParam::gain, ServoParam::tau, ServoParam::latency}) {
+    const double by = std::abs(counted.moves[param]) / std::sqrt(fit.cov(param, param));
+    if (!(by > flaw.moves)) continue;
+    flaw.moves = by;
+    flaw.moved = param == ServoParam::gain ? "gain_rad" : servo_param_names[static_cast<std::size_t>(param)];
+    flaw.moved_by = counted.moves[param];
+  }
+  return flaw;
+}
+
 /// A command is valid from its own time on: by definition, or, of commands between rows, within a row.
 Assumption assumed_offset(const ServoIdentification& identified) {
   const double sigma_s = identified.sigma_command_s;
@@ -111,16 +137,10 @@ std::vector<Assumption> assumed_of(const Identification& identified, double sigm
                                      assumed_offset(identified)};
   if (identified.encoder_wraps > 0)
     assumed.push_back({.name = "encoder_turn_rad", .value = 2.0 * std::numbers::pi, .sigma = 0.0, .moved = "gain_rad"});
-  for (const CountedFlaw& counted : identified.counted) {
-    const bool is_listed =
-        std::ranges::any_of(identified.hidden, [&](const HiddenFlaw& hidden) { return hidden.flaw == counted.flaw; });
-    if (is_listed) continue;
-    assumed.push_back({.name = servo_flaw_names[counted.flaw],
-                       .value = 0.0,
-                       .sigma = counted.sigma,
-                       .moves = std::abs(counted.gain_moves) / sigma,
-                       .moved = "gain_rad",
-                       .moved_by = counted.gain_moves});
+  for (const CountedFlaw& counted : by_name(identified.counted)) {
+    const bool is_listed = std::ranges::any_of(
+        identified.hidden, [&](const HiddenFlaw& hidden) { return servo_flaw_names[hidden.flaw] == counted.name; });
+    if (!is_listed) assumed.push_back(assumed_flaw(identified.fit, counted));
   }
   for (const HiddenFlaw& hidden : identified.hidden)
     assumed.push_back({.name = servo_flaw_names[hidden.flaw],

@@ -145,10 +145,12 @@ struct ZeroSlip {
   double t_s = 0.0, size_rad = 0.0, sigma_rad = 0.0;
 };
 
-/// A nonlinearity assumed absent, its typical size, and the effect on the gain beside the log's information.
+/// What is assumed absent, its typical size, and its effect on the parameters beside the log's information.
 struct CountedFlaw {
-  std::size_t flaw = 0;
-  double sigma = 0.0, gain_moves = 0.0;
+  std::string name;  ///< As in servo_flaw_names, or "encoder_eccentricity_rad".
+  double sigma = 0.0;
+  ServoParams moves = ServoParams::Zero();  ///< [σ of it]
+  std::string remedy;
 };
 
 struct ServoIdentification {

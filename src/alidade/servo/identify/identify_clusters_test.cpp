@@ -33,6 +33,13 @@ struct Coverage {
   double one = 0.0, two = 0.0, model_two = 0.0;
 };
 
+/// σ without what is counted of errors that these logs do not have.
+double sigma_of_noise(const ServoIdentification& identified, int param) {
+  double variance = identified.fit.cov(param, param);
+  for (const CountedFlaw& counted : identified.counted) variance -= counted.moves[param] * counted.moves[param];
+  return std::sqrt(variance);
+}
+
 /// Over gain, time constant, latency and zero.
 Coverage coverage_of(double colour, bool is_chirp, int num_runs) {
   const ServoLogScene scene;
@@ -40,11 +47,12 @@ Coverage coverage_of(double colour, bool is_chirp, int num_runs) {
   truth << gain_of(scene.axis.plant), tau_of(scene.axis.plant), 0.083, 0.3, 0.0;
   Coverage coverage;
   for (int seed = 1; seed <= num_runs; ++seed) {
-    const ServoFit fit = identify_servo(coloured_log(colour, is_chirp, static_cast<std::uint64_t>(seed))).fit;
+    const ServoIdentification found = identify_servo(coloured_log(colour, is_chirp, static_cast<std::uint64_t>(seed)));
+    const ServoFit& fit = found.fit;
     for (int k = 0; k < 4; ++k) {
       const double error = std::abs(fit.params[k] - truth[k]), share = 1.0 / (4.0 * num_runs);
-      coverage.one += error < std::sqrt(fit.cov(k, k)) ? share : 0.0;
-      coverage.two += error < 2.0 * std::sqrt(fit.cov(k, k)) ? share : 0.0;
+      coverage.one += error < sigma_of_noise(found, k) ? share : 0.0;
+      coverage.two += error < 2.0 * sigma_of_noise(found, k) ? share : 0.0;
       coverage.model_two += error < 2.0 * std::sqrt(fit.cov_model(k, k)) ? share : 0.0;
     }
   }

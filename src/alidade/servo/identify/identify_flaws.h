@@ -94,6 +94,10 @@ void count_short_lag(std::span<const ServoSample> log, ServoFit& fit);
 /// Whether the lag is of an acceleration or of what swings, so that the axis needs no other.
 [[nodiscard]] bool is_lagged_otherwise(const ServoFit& fit);
 
+/// Whether it has a resonance whose share is within 3σ of none: how much of the latency is its delay 2ζ/ω is then open
+/// (`count_short_lag` counts all of it).
+[[nodiscard]] bool is_hardly_excited(const ServoFit& fit);
+
 /// Response − readings.
 [[nodiscard]] Eigen::VectorXd flawed_misfit(std::span<const ServoSample> log, const ServoFit& fit);
 
@@ -120,6 +124,15 @@ struct FlawScore {
 /// Of a few sizes, the one that explains most first.
 [[nodiscard]] std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const ServoFit& fit,
                                                  const FlawGround& ground, std::size_t flaw);
+
+/// What a resonance of that damping and a share of one would add to a response: one column for each frequency of a grid
+/// up to what the readings resolve.
+struct AddedResonances {
+  std::vector<double> hz;
+  Eigen::MatrixXd added;
+};
+[[nodiscard]] AddedResonances added_resonances(std::span<const ServoSample> log, const Eigen::VectorXd& response,
+                                               double damping);
 
 /// Beyond it a log is said to have a resonance: of a true model's largest score among the grid's frequencies less than
 /// one in a thousand is.

@@ -126,6 +126,13 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
          "the clocks' drift is within a row by the end of the log, as of commands at a regular spacing that are given "
          "between rows: then the latency is up to a row longer; log when commands are given (command_t_s)",
          identified.duration_s * std::abs(fit.flaws.clock_rate), identified.sigma_command_s, "s", ""});
+  if (is_hardly_excited(fit))
+    verdict.checks.push_back({"resonance", State::care,
+                              "commands hardly excite the resonance: how much of the latency is its delay is open, and "
+                              "counted in σ; log steps, or a chirp up to " +
+                                  text_of(fit.flaws.resonance_hz, 2) + " Hz",
+                              std::abs(fit.flaws.resonance_share), 3.0 * fit.flaw_sigma[ServoFlaw::resonance_share],
+                              "1", ""});
   if (!fit.has_converged)
     verdict.checks.push_back({"convergence", State::care, "the fit was still moving", 0.0, 0.0, "1", ""});
 }

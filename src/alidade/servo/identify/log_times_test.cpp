@@ -76,10 +76,14 @@ TEST(ServoLogTimes, TheClockOfTheLogIsCounted) {
   const Identification counted = identify(log);
   EXPECT_EQ(counted.verdict.state, State::good);
   EXPECT_LT(std::abs(error_in_sigma(counted.fit, scene, ServoParam::gain)), 2.0);
-  EXPECT_NEAR(counted.assumed[1].moves, 1.0, 0.1);
   EXPECT_EQ(counted.assumed[1].moved, "gain_rad");
+  const double gain = gain_of(scene.axis.plant), variance = counted.fit.cov(ServoParam::gain, ServoParam::gain);
+  EXPECT_NEAR(counted.assumed[1].moved_by, 0.001 * gain, 1e-5 * gain);
   const Identification exact = identify(log, {.sigma_clock = 0.0});
-  EXPECT_GT(std::abs(error_in_sigma(exact.fit, scene, ServoParam::gain)), 5.0);
+  EXPECT_NEAR(variance - exact.fit.cov(ServoParam::gain, ServoParam::gain), std::pow(0.001 * gain, 2),
+              0.01 * std::pow(0.001 * gain, 2));
+  const double noise = std::sqrt(exact.fit.cov_model(ServoParam::gain, ServoParam::gain));
+  EXPECT_GT(std::abs(exact.fit.params[ServoParam::gain] - gain), 5.0 * noise);  // beside what is counted otherwise
   EXPECT_THROW(static_cast<void>(identify(log, {.sigma_clock = -1.0})), ConfigError);
 }
 

@@ -1,6 +1,8 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/servo/identify/identify_flaws.h"
@@ -16,7 +18,17 @@ bool is_lagged_otherwise(const ServoFit& fit) {
   });
 }
 
+bool is_hardly_excited(const ServoFit& fit) {
+  constexpr double clear = 3.0;
+  return std::ranges::count(fit.freed, std::size_t{ServoFlaw::resonance}) > 0 &&
+         std::abs(fit.flaws.resonance_share) < clear * fit.flaw_sigma[ServoFlaw::resonance_share];
+}
+
 void count_short_lag(std::span<const ServoSample> log, ServoFit& fit) {
+  if (is_hardly_excited(fit)) {
+    const double per_omega = fit.flaws.resonance_damping / (std::numbers::pi * fit.flaws.resonance_hz);
+    fit.cov(ServoParam::latency, ServoParam::latency) += std::pow(per_omega * fit.flaws.resonance_share, 2);
+  }
   const double tau_s = fit.params[ServoParam::tau];
   if (!is_lagged_otherwise(fit) || tau_s > usual_spacing(log)) return;
   ServoParams by = ServoParams::Zero();

@@ -1,10 +1,9 @@
-#include "alidade/servo/identify/identify_causes.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/identify_flaws.h"
 
 namespace alidade {
@@ -12,6 +11,8 @@ namespace {
 
 constexpr double ordinary_dead_band = 0.002;  // of the largest command: friction, rounded commands
 constexpr double ordinary_backlash_rad = 0.03 * degree;
+constexpr double ordinary_eccentricity_rad = 1e-3;  // 20 µm of an encoder's ring of 40 mm
+constexpr double ordinary_damping = 0.2, ordinary_share = 0.5;
 
 /// A flaw that is taken to be none, and σ of what there may be of it.
 struct Ordinary {
@@ -23,33 +24,94 @@ bool is_freed(const ServoFit& fit, double ServoFlaws::*flaw) {
   return std::ranges::any_of(fit.freed, [&](std::size_t each) { return servo_flaws[each] == flaw; });
 }
 
+/// What the parameters do about effects that are not in the model.
+class Considered {
+ public:
+  Considered(const ServoIdentification& identified, const FlawGround& ground, const Eigen::MatrixXd& J,
+             const Eigen::MatrixXd& inverse)
+      : ground_(ground),
+        J_(J),
+        inverse_(inverse),
+        variance_(std::pow(identified.fit.rms_rad, 2) * std::max(1.0, identified.clusters.design_effect)) {}
+  [[nodiscard]] bool knows() const { return variance_ > 0.0; }
+
+  /// By how much they move, beside what the log says of it, for what one σ of an effect adds to the response. Of one
+  /// that has a single sign nothing is left where the residuals ask for the other.
+  [[nodiscard]] Eigen::VectorXd follow(const Eigen::VectorXd& added, bool has_one_sign) const {
+    const Eigen::VectorXd own = added - ground_.across * (ground_.across.transpose() * added);
+    // In units of its σ: what is left of it after the log, about zero.
+    const double left2 = 1.0 / (1.0 + own.squaredNorm() / variance_);
+    const double mean = -left2 * own.dot(ground_.misfit) / variance_;
+    const double share = std::sqrt(left2 + std::pow(has_one_sign ? std::max(mean, 0.0) : mean, 2));
+    return -share * (inverse_ * (J_.transpose() * added));
+  }
+
+ private:
+  const FlawGround& ground_;
+  const Eigen::MatrixXd &J_, &inverse_;
+  double variance_;
+};
+
+void count(const Eigen::VectorXd& follow, ServoFit& fit) {
+  fit.cov += follow.head<num_servo_params>() * follow.head<num_servo_params>().transpose();
+  for (std::size_t i = 0; i < fit.freed.size(); ++i) {
+    double& sigma = fit.flaw_sigma[fit.freed[i]];
+    sigma = std::hypot(sigma, follow[num_servo_params + static_cast<Eigen::Index>(i)]);
+  }
+}
+
+/// An encoder whose ring is not centred reads a sine of the angle too much, wherever that begins: a sine and a cosine.
+void count_eccentricity(const FlawGround& ground, const Considered& considered, ServoIdentification& result) {
+  const std::array<Eigen::VectorXd, 2> waves{ground.response.array().cos(), ground.response.array().sin()};
+  for (const Eigen::VectorXd& wave : waves) {
+    const Eigen::VectorXd follow = considered.follow(ordinary_eccentricity_rad * wave, false);
+    count(follow, result.fit);
+    result.counted.push_back(
+        {"encoder_eccentricity_rad", ordinary_eccentricity_rad, follow.head<num_servo_params>(), {}});
+  }
+}
+
+/// A resonance that the log does not excite, of the frequency at which it moves the latency most: below, it shows.
+void count_resonance(std::span<const ServoSample> log, const FlawGround& ground, const Considered& considered,
+                     ServoIdentification& result) {
+  if (is_freed(result.fit, &ServoFlaws::resonance_hz)) return;
+  const AddedResonances all = added_resonances(log, ground.response, ordinary_damping);
+  Eigen::VectorXd most = Eigen::VectorXd::Zero(num_servo_params);
+  double hz = 0.0;
+  for (std::size_t i = 0; i < all.hz.size(); ++i) {
+    const Eigen::VectorXd follow =
+        considered.follow(ordinary_share * all.added.col(static_cast<Eigen::Index>(i)), false);
+    if (!(std::abs(follow[ServoParam::latency]) > std::abs(most[ServoParam::latency]))) continue;
+    most = follow;
+    hz = all.hz[i];
+  }
+  if (!(hz > 0.0)) return;
+  count(most, result.fit);
+  result.counted.push_back({"resonance_share", ordinary_share, most.head<num_servo_params>(),
+                            "log steps, or a chirp up to " + text_of(hz, 2) + " Hz"});
+}
+
 }  // namespace
 
 void count_ordinary_flaws(std::span<const ServoSample> log, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse,
                           ServoIdentification& result) {
   ServoFit& fit = result.fit;
   const FlawGround ground = flaw_ground(log, fit);
-  const double variance = fit.rms_rad * fit.rms_rad * std::max(1.0, result.clusters.design_effect);
+  const Considered considered(result, ground, J, inverse);
+  if (!considered.knows()) return;
   const std::array<Ordinary, 2> all{{{&ServoFlaws::dead_band, ordinary_dead_band * largest_command(log)},
                                      {&ServoFlaws::backlash_rad, ordinary_backlash_rad}}};
   for (const Ordinary& each : all) {
-    if (is_freed(fit, each.flaw) || !(each.sigma > 0.0) || !(variance > 0.0)) continue;
+    if (is_freed(fit, each.flaw) || !(each.sigma > 0.0)) continue;
     ServoFlaws flaws = fit.flaws;
     flaws.*each.flaw = each.sigma;
-    const Eigen::VectorXd added = flawed_response(log, fit, flaws) - ground.response;
-    const Eigen::VectorXd own = added - ground.across * (ground.across.transpose() * added);
-    // In units of its σ: what is left of it after the log, about zero.
-    const double left2 = 1.0 / (1.0 + own.squaredNorm() / variance), mean = -left2 * own.dot(ground.misfit) / variance;
-    const double share = std::sqrt(left2 + std::pow(std::max(mean, 0.0), 2));
-    const Eigen::VectorXd follow = -share * (inverse * (J.transpose() * added));
-    fit.cov += follow.head<num_servo_params>() * follow.head<num_servo_params>().transpose();
-    for (std::size_t i = 0; i < fit.freed.size(); ++i) {
-      double& sigma = fit.flaw_sigma[fit.freed[i]];
-      sigma = std::hypot(sigma, follow[num_servo_params + static_cast<Eigen::Index>(i)]);
-    }
-    const auto flaw = std::ranges::find(servo_flaws, each.flaw) - servo_flaws.begin();
-    result.counted.push_back({static_cast<std::size_t>(flaw), each.sigma, follow[ServoParam::gain]});
+    const Eigen::VectorXd follow = considered.follow(flawed_response(log, fit, flaws) - ground.response, true);
+    count(follow, fit);
+    const auto flaw = static_cast<std::size_t>(std::ranges::find(servo_flaws, each.flaw) - servo_flaws.begin());
+    result.counted.push_back({servo_flaw_names[flaw], each.sigma, follow.head<num_servo_params>(), {}});
   }
+  count_eccentricity(ground, considered, result);
+  count_resonance(log, ground, considered, result);
 }
 
 }  // namespace alidade

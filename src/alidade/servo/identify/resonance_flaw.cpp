@@ -196,6 +196,16 @@ std::vector<ServoFlaws> other_causes(std::span<const ServoSample> log, const Ser
 
 }  // namespace
 
+AddedResonances added_resonances(std::span<const ServoSample> log, const Eigen::VectorXd& response, double damping) {
+  constexpr double ratio = 1.15;
+  const std::vector<double> times_s = reading_times(log);
+  AddedResonances all{frequencies(log, ratio), {}};
+  all.added.resize(response.size(), static_cast<Index>(all.hz.size()));
+  for (std::size_t i = 0; i < all.hz.size(); ++i)
+    all.added.col(static_cast<Index>(i)) = added_by(times_s, response, all.hz[i], damping);
+  return all;
+}
+
 ResonanceScore resonance_score(std::span<const ServoSample> log, const ServoFit& fit, FlawGround ground,
                                std::span<const ServoFlaws> others) {
   constexpr double ratio = 1.06;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -145,6 +146,13 @@ struct ZeroSlip {
   double t_s = 0.0, size_rad = 0.0, sigma_rad = 0.0;
 };
 
+/// From a time on the axis is another: a load, a motor that warms up, a network.
+struct ServoChange {
+  double t_s = 0.0;
+  ServoFit whole;          ///< As one, without flaws.
+  ServoFit before, after;  ///< Of the log until then, and from then on.
+};
+
 /// What is assumed absent, its typical size, and its effect on the parameters beside the log's information.
 struct CountedFlaw {
   std::string name;  ///< As in servo_flaw_names, or "encoder_eccentricity_rad".
@@ -176,6 +184,7 @@ struct ServoIdentification {
   std::size_t commands_per_row = 0;
   std::vector<std::size_t> lost_commands;  ///< Rows whose command the axis did not follow; the one before held on.
   std::vector<ZeroSlip> slips;             ///< Of the encoder's zero, estimated with the fit.
+  std::optional<ServoChange> change;       ///< Where the axis does not stay what it is; `fit` is then the whole's.
   double lag_one_correlation = 0.0;        ///< Of the residuals, one row to the next: near 0 where the model is enough.
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };

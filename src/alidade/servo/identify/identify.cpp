@@ -316,6 +316,18 @@ Solution with_commands_between_tried(const std::vector<ServoSample>& log, Soluti
   return as_logged;
 }
 
+/// An axis that is another from some time on passes for a drift of clocks, or for limits. Then without these.
+void find_change(Solution& found, ServoIdentification& result) {
+  const ServoFit& fit = found.fit();
+  const bool drifts = std::ranges::any_of(
+      fit.freed, [](std::size_t flaw) { return flaw == ServoFlaw::clock_rate || flaw == ServoFlaw::gain_drift; });
+  if (found.times || (!drifts && is_white(found.log, fit))) return;
+  result.change = servo_change(found.log, fit);
+  if (!result.change) return;
+  found.fits[found.believed] = result.change->whole;
+  found.rivals[found.believed].clear();
+}
+
 void count_command_times(std::span<const ServoSample> log, const Solution& found, ServoIdentification& result) {
   const std::optional<CommandTimes>& times = found.times;
   if (times) {
@@ -353,6 +365,7 @@ ServoIdentification identify_servo(std::span<const ServoSample> as_read, ServoKi
   result.has_frequent_commands = !found.times && has_frequent_commands(as_read);
   if (result.has_frequent_commands)
     found = with_commands_between_tried(rows, std::move(found), rule, result.commands_per_row);
+  find_change(found, result);
   const std::vector<ServoSample>& log = found.log;
   result.fit = found.fit();
   result.other = found.fits[1 - found.believed];

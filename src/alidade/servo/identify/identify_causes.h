@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,5 +34,12 @@ struct ServoCause {
 /// `inverse`: (JᵀJ)⁻¹ of the parameters and freed flaws, whose derivatives are J. They are listed in `counted`.
 void count_ordinary_flaws(std::span<const ServoSample> log, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse,
                           ServoIdentification& result);
+
+/// The time from which on gain, time constant or latency are others, if two plain fits, one to each part of the log,
+/// leave white residuals and explain clearly more than what is believed. None of held encoders.
+[[nodiscard]] std::optional<ServoChange> servo_change(std::span<const ServoSample> log, const ServoFit& believed);
+
+/// "the latency from 63 to 93 ms".
+[[nodiscard]] std::string change_text(const ServoChange& change);
 
 }  // namespace alidade

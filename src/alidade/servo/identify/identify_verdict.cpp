@@ -89,6 +89,15 @@ void add_faults(std::span<const ServoSample> log, const ServoIdentification& ide
          slip.size_rad, 3.0 * slip.sigma_rad, "rad", ""});
 }
 
+/// Before what it may be taken for.
+void add_change(const ServoIdentification& identified, Verdict& verdict) {
+  if (!identified.change) return;
+  verdict.checks.push_back({"constancy", State::care,
+                            "at about t = " + text_of(identified.change->t_s) + " s the axis becomes another: " +
+                                change_text(*identified.change) + "; the answer is of both as one: part the log there",
+                            identified.change->t_s, 0.0, "s", ""});
+}
+
 void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const double correlation = identified.lag_one_correlation, rows = static_cast<double>(reading_times(log).size());
@@ -145,7 +154,7 @@ std::string flaw_text(const ServoFit& fit, std::size_t flaw) {
 /// What the servo does beside a lag: what was estimated, and what the residuals still indicate.
 void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
-  const std::vector<ServoCause> causes = servo_causes(log, identified);
+  const std::vector<ServoCause> causes = identified.change ? std::vector<ServoCause>() : servo_causes(log, identified);
   Check check{
       .name = "causes",
       .text = "neither limits, dead band, backlash, a second lag, a resonance, a drift of clocks nor another gain show",
@@ -295,6 +304,7 @@ Verdict verdict_of(std::span<const ServoSample> log, const ServoIdentification& 
   Verdict verdict;
   add_readings(log, identified, verdict);
   add_faults(log, identified, verdict);
+  add_change(identified, verdict);
   add_checks(log, identified, verdict);
   add_causes(without_faults(with_commands_between(log, identified.commands_per_row), identified.lost_commands,
                             identified.slips),

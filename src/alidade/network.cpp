@@ -58,21 +58,25 @@ NetworkCalibration network(std::vector<TargetObservation> observations, const st
   result.counts.dropped = result.counts.given - result.counts.used;
   result.observations = std::move(observations);
   if (result.status != MovingTargetReport::Status::placed) return result;
-  result.covariance = result.rig.cov;
-  result.parameter_names = parameter_names(result.rig);
+  const Rig located = located_rig(result);
+  result.covariance = located.cov;
+  result.parameter_names = parameter_names(located);
   return result;
+}
+
+Eigen::MatrixXd located_part(const MovingTargetReport& report, const Eigen::MatrixXd& of_all) {
+  std::vector<Eigen::Index> from;
+  for (std::size_t h = 0; h < report.cameras.size(); ++h)
+    for (Eigen::Index k = 0; report.cameras[h].placed && k < num_head_params; ++k)
+      from.push_back(num_head_params * static_cast<Eigen::Index>(h) + k);
+  return of_all(from, from);
 }
 
 Rig located_rig(const MovingTargetReport& report) {
   Rig rig;
-  std::vector<Eigen::Index> from;
-  for (std::size_t h = 0; h < report.cameras.size(); ++h) {
-    if (!report.cameras[h].placed) continue;
-    rig.heads.push_back(report.rig.heads[h]);
-    for (Eigen::Index k = 0; k < num_head_params; ++k)
-      from.push_back(num_head_params * static_cast<Eigen::Index>(h) + k);
-  }
-  rig.cov = report.rig.cov(from, from);
+  for (std::size_t h = 0; h < report.cameras.size(); ++h)
+    if (report.cameras[h].placed) rig.heads.push_back(report.rig.heads[h]);
+  rig.cov = located_part(report, report.rig.cov);
   return rig;
 }
 

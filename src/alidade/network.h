@@ -23,6 +23,9 @@ ALIDADE_PUBLIC_BEGIN
 /// The located heads alone, with their part of the covariance.
 [[nodiscard]] Rig located_rig(const MovingTargetReport& report);
 
+/// Of a covariance of all heads, as rig.cov, the part of those that were located.
+[[nodiscard]] Eigen::MatrixXd located_part(const MovingTargetReport& report, const Eigen::MatrixXd& of_all);
+
 /// The observations of the located cameras on the rig's one clock, in order of time: what `alidade track` reads.
 [[nodiscard]] std::vector<TargetObservation> observations_on_one_clock(const NetworkCalibration& calibration);
 

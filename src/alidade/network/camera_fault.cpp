@@ -1,5 +1,6 @@
 #include "alidade/network/camera_fault.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,7 +17,18 @@ struct Agreement {
   std::size_t num_placed = 0;
   double sigma_px = std::numeric_limits<double>::infinity();  ///< Root mean square of the cameras'.
   double focal_sigmas = 0.0;                                  ///< By which a focal length is asked to be another, most.
+  double flatness = 1.0;  ///< The path's thickness over its length: of one in a plane, 0.
 };
+
+double flatness_of(std::span<const Eigen::Vector3d> path) {
+  if (path.empty()) return 1.0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : path) mean += point / static_cast<double>(path.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& point : path) scatter += (point - mean) * (point - mean).transpose();
+  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
+  return squares[2] > 0.0 ? std::sqrt(std::max(0.0, squares[0]) / squares[2]) : 1.0;
+}
 
 Agreement agreement_of(const MovingTargetReport& report) {
   Agreement agreement;
@@ -29,6 +41,7 @@ Agreement agreement_of(const MovingTargetReport& report) {
   }
   for (const FocalScore& focal : report.focals)
     agreement.focal_sigmas = std::max(agreement.focal_sigmas, focal.sigmas());
+  agreement.flatness = flatness_of(report.path);
   if (agreement.num_placed > 0) agreement.sigma_px = std::sqrt(sum2 / static_cast<double>(agreement.num_placed));
   return agreement;
 }
@@ -100,18 +113,21 @@ std::string name_of(const RigHead& head) { return std::to_string(head.head.id); 
 
 /// What may be wrong, each thing undone: mirrored images, where the cameras do not agree at all, and exchanged lenses.
 Best best_undone(const std::vector<TargetObservation>& observations, const std::vector<RigHead>& given,
-                 std::span<const std::pair<std::size_t, std::size_t>> exchanges, bool doubtful,
+                 std::span<const std::pair<std::size_t, std::size_t>> exchanges, bool doubtful, double clock_search_s,
                  const PlaceCameras& place) {
+  constexpr double flat = 0.05;  // a path in a plane has a mirrored one that fits as well
   Best best;
   for (std::size_t h = 0; doubtful && h < given.size() && (given.size() > 2 || h == 0); ++h) {
     const std::string words = given.size() == 2 ? "one of the two cameras gives mirrored images"
                                                 : "the images of head " + name_of(given[h]) + " are mirrored";
-    best.consider(agreement_of(place(mirrored(observations, h, given[h].camera.width_px), given, doubtful)), words);
+    const auto undone = mirrored(observations, h, given[h].camera.width_px);
+    const Agreement agreement = agreement_of(place(undone, given, clock_search_s));
+    if (agreement.flatness > flat) best.consider(agreement, words);
   }
   for (const auto& [a, b] : exchanges) {
     std::vector<RigHead> exchanged = given;
     std::swap(exchanged[a].camera, exchanged[b].camera);
-    const Agreement agreement = agreement_of(place(observations, exchanged, doubtful));
+    const Agreement agreement = agreement_of(place(observations, exchanged, clock_search_s));
     // One wrong file may fit another head better, and is as wrong there.
     if (agreement.focal_sigmas > focal_limit) continue;
     best.consider(agreement, "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
@@ -119,10 +135,34 @@ Best best_undone(const std::vector<TargetObservation>& observations, const std::
   return best;
 }
 
+/// One camera whose clock is another: the reference's if all others differ from it alike.
+void consider_clocks(const std::vector<TargetObservation>& observations, const std::vector<RigHead>& given,
+                     const PlaceCameras& place, Best& best) {
+  constexpr double search_s = 1.0, min_sigmas = 5.0, same_s = 0.015;
+  const MovingTargetReport report = place(observations, given, search_s);
+  const Agreement agreement = agreement_of(report);
+  std::vector<std::size_t> other;
+  const auto [first, last] = std::ranges::minmax_element(observations, {}, &TargetObservation::t_capture_s);
+  const double mid_s = 0.5 * (first->t_capture_s + last->t_capture_s);
+  std::vector<double> late_s;
+  for (const LocatedCamera& camera : report.cameras) late_s.push_back(mid_s - camera.clock.in_rig(mid_s));
+  std::vector<double> sorted = late_s;
+  std::ranges::sort(sorted);
+  const double usual_s = sorted[sorted.size() / 2];
+  for (std::size_t h = 0; h < late_s.size(); ++h)
+    if (std::abs(late_s[h] - usual_s) > std::max(same_s, min_sigmas * report.cameras[h].sigma_clock_s))
+      other.push_back(h);
+  if (other.size() != 1 || given.size() < 3) return;
+  const double by_s = late_s[other.front()] - usual_s;
+  best.consider(agreement, "the clock of head " + name_of(given[other.front()]) + " is " +
+                               text_of(1e3 * std::abs(by_s), 2) + " ms " + (by_s > 0.0 ? "ahead of" : "behind") +
+                               " the others'");
+}
+
 }  // namespace
 
 std::string camera_fault_of(const MovingTargetReport& report, std::span<const TargetObservation> observations,
-                            std::span<const RigHead> heads, const PlaceCameras& place) {
+                            std::span<const RigHead> heads, double clock_search_s, const PlaceCameras& place) {
   const bool doubtful = is_doubtful(report);
   if (observations.empty() || report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits)
     return "";
@@ -137,13 +177,15 @@ std::string camera_fault_of(const MovingTargetReport& report, std::span<const Ta
                : by_one_clock(report, observations);
   std::vector<TargetObservation> some = central_minute(all);
   const std::vector<RigHead> given(heads.begin(), heads.end());
-  Agreement as_given = agreement_of(place(some, given, doubtful));
+  const double search_s = doubtful ? clock_search_s : 0.0;
+  Agreement as_given = agreement_of(place(some, given, search_s));
   // A minute may not locate cameras that all observations do: what is exchanged is compared with the same.
   if (const Agreement in_all = agreement_of(report); in_all.num_placed > as_given.num_placed) {
     some = all;
     as_given = in_all;
   }
-  const Best best = best_undone(some, given, exchanges, doubtful, place);
+  Best best = best_undone(some, given, exchanges, doubtful, search_s, place);
+  if (doubtful && clock_search_s == 0.0) consider_clocks(some, given, place, best);
   // By as much less is left as no chance would have it: of thousands of observations a hundredth would be.
   // Where one was not located at all, the others may have agreed well: so must all now.
   constexpr double much_less = 0.93, about_as_little = 1.3;

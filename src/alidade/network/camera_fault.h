@@ -9,14 +9,17 @@
 
 namespace alidade {
 
-/// How cameras are located from these observations through these lenses; whether their clocks are searched, or one.
+/// How cameras are located from these observations through these lenses; their clocks are searched so far. 0: one
+/// clock.
 using PlaceCameras = std::function<MovingTargetReport(const std::vector<TargetObservation>& observations,
-                                                      const std::vector<RigHead>& heads, bool searches)>;
+                                                      const std::vector<RigHead>& heads, double clock_search_s)>;
 
-/// Names a camera whose images are mirrored, or two cameras whose lenses are exchanged: where undoing that makes all
-/// cameras agree. One sentence; empty where nothing is wrong, or none of these explains it.
+/// Names a camera whose images are mirrored or whose clock is another, or two cameras whose lenses are exchanged: where
+/// undoing that makes all cameras agree. One sentence; empty where nothing is wrong, or none of these explains it.
+/// `clock_search_s`: with which `report` was made.
 [[nodiscard]] std::string camera_fault_of(const MovingTargetReport& report,
                                           std::span<const TargetObservation> observations,
-                                          std::span<const RigHead> heads, const PlaceCameras& place);
+                                          std::span<const RigHead> heads, double clock_search_s,
+                                          const PlaceCameras& place);
 
 }  // namespace alidade

@@ -132,7 +132,7 @@ std::optional<Resection> resection(const ObservationSeries& camera, std::span<co
   cv::Mat turn, translation, agree;
   const double reach = std::max(2.0 * min_agree, 2.0 * agree_px / camera.px);
   if (!cv::solvePnPRansac(points, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, translation, false, 100,
-                          static_cast<float>(reach), 0.99, agree, cv::SOLVEPNP_EPNP))
+                          static_cast<float>(reach), 0.99, agree, cv::SOLVEPNP_SQPNP))  // EPnP fails in a plane
     return std::nullopt;
   Eigen::Vector3d phi, t;
   cv::cv2eigen(turn, phi);

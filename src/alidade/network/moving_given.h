@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "alidade/estimation/verdict.h"
+#include "alidade/network/moving_scale.h"
 #include "alidade/network/moving_solve.h"
 #include "alidade/network/moving_target.h"
 
@@ -20,5 +21,10 @@ struct MovingGiven {
 };
 [[nodiscard]] MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved,
                                        const MovingTargetConfig& config);
+
+/// Fills in the report's covariance of the heads, which stand in their world already: with that of the similarity,
+/// where a true path gave it (`match`; else nullptr), and the worst camera's σ in the frame of the reference.
+void take_covariance(const MovingProblem& problem, const MovingGiven& given, const Eigen::MatrixXd& cov_model,
+                     const PathMatch* match, MovingTargetReport& report);
 
 }  // namespace alidade

@@ -1,5 +1,6 @@
 #include "alidade/network/moving_scale.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -151,6 +152,15 @@ void fill_misses(const Pairs& pairs, double duration_s, PathMatch& match) {
   // What is left varies slowly: moments 2 s apart are taken to err on their own.
   const double alone = std::max(3.0, duration_s / 2.0);
   match.sigma_scale = match.median_m / match.extent_m / std::sqrt(alone);
+  match.sigma_translation_m = match.median_m / std::sqrt(alone);
+  match.middle = mean;
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& point : pairs.truth) {
+    const Eigen::Vector3d arm = point - mean;
+    inertia += (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose()) /
+               static_cast<double>(pairs.truth.size());
+  }
+  match.cov_rotation = match.sigma_translation_m * match.sigma_translation_m * inertia.inverse();
 }
 
 }  // namespace

@@ -16,6 +16,11 @@ struct PathMatch {
   double covered = 0.0;               ///< Share of the path that the truth covers.
   double median_m = 0.0, rms_m = 0.0, sigma_scale = 0.0;
   double extent_m = 0.0;  ///< RMS distance of the path from its centroid.
+  /// Of the similarity about that centroid, in the truth's world; what is left of the path varies slowly, and counts
+  /// so.
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double sigma_translation_m = 0.0;  ///< Along each axis.
+  Eigen::Matrix3d cov_rotation = Eigen::Matrix3d::Zero();
 };
 
 /// The similarity and clock that bring a path (in any unit) onto a true one; all offsets at which the truth covers most

@@ -69,6 +69,10 @@ std::optional<Resection> best_resection(const ObservationSeries& series, const M
   return best;
 }
 
+std::size_t num_placed(const MovingStart& start) {
+  return static_cast<std::size_t>(std::ranges::count(start.cameras, true, &MovingStart::Placed::placed));
+}
+
 bool place_next(std::span<const ObservationSeries> series, const std::vector<ObservationPair>& pairs, bool searches,
                 std::vector<bool>& tried, MovingStart& start) {
   const ObservationPair* next = nullptr;
@@ -86,7 +90,8 @@ bool place_next(std::span<const ObservationSeries> series, const std::vector<Obs
   const auto best = best_resection(series[added], start, around_s, searches, camera);
   camera.placed = best && best->share >= min_share;
   if (!camera.placed) {
-    camera.reason = "at no difference of clocks do half of its observations agree with the other cameras'";
+    camera.reason = searches ? "at no difference of clocks do half of its observations agree with the other cameras'"
+                             : "by one clock fewer than half of its observations agree with the other cameras'";
     return true;
   }
   camera.cam_from_world = best->cam_from_world;
@@ -153,42 +158,61 @@ void rebuild_path(std::span<const ObservationSeries> series, double knot_s, Movi
   start.path = std::move(rebuilt.path);
 }
 
-MovingStart start_cameras(std::span<const ObservationSeries> series, double search_s, double knot_s,
-                          const Progress& progress) {
+namespace {
+
+/// All cameras, one after the other, from this pair on; none where it has no pose: of a pair with a mirrored camera
+/// rays agree, but meet behind one of the two.
+std::optional<MovingStart> start_from(const ObservationPair& pair, std::span<const ObservationSeries> series,
+                                      const std::vector<ObservationPair>& pairs, double search_s, double knot_s,
+                                      const Progress& progress) {
+  auto pose = relative_pose(series[pair.first], series[pair.second], pair.offset_s);
+  if (!pose) return std::nullopt;
   MovingStart start;
   start.cameras.resize(series.size());
-  const std::vector<ObservationPair> pairs = given_pairs(series, search_s, progress);
-  start.has_common = !pairs.empty();
-  std::vector<ObservationPair> by_strength = pairs;
-  std::ranges::sort(by_strength, std::greater{}, start_strength);
-  if (by_strength.empty()) return start;
-  start.best_share = by_strength.front().share;
-  // Of a pair with a mirrored camera rays agree, but meet behind one of the two: it has no pose.
-  auto best = by_strength.begin();
-  std::optional<RelativePose> pose;
-  for (; best != by_strength.end() && !pose; ++best) {
-    if (best->share < min_share) return start;
-    pose = relative_pose(series[best->first], series[best->second], best->offset_s);
-    if (pose) break;
-  }
-  if (!pose) return start;
   start.found = true;
-  start.first = best->first;
-  start.second = best->second;
-  start.t_s = pose->t_s;
-  start.path = pose->point_in_first;
-  start.cameras[best->first].placed = start.cameras[best->second].placed = true;
-  start.cameras[best->second].cam_from_world = pose->cam_from_first;
-  start.cameras[best->second].offset_s = best->offset_s;
-  std::vector<bool> tried(series.size(), false);
+  start.first = pair.first;
+  start.second = pair.second;
+  start.t_s = std::move(pose->t_s);
+  start.path = std::move(pose->point_in_first);
+  start.cameras[pair.first].placed = start.cameras[pair.second].placed = true;
+  start.cameras[pair.second].cam_from_world = pose->cam_from_first;
+  start.cameras[pair.second].offset_s = pair.offset_s;
   rebuild_path(series, knot_s, start);
-  while (place_next(series, pairs, search_s > 0.0, tried, start)) {
-    report_progress(progress, "cameras", 0, series.size());
-    rebuild_path(series, knot_s, start);
+  // By the path of more cameras one may agree that did not before.
+  for (std::size_t num_before = 0; num_before != num_placed(start);) {
+    num_before = num_placed(start);
+    std::vector<bool> tried(series.size(), false);
+    while (place_next(series, pairs, search_s > 0.0, tried, start)) {
+      report_progress(progress, "cameras", 0, series.size());
+      rebuild_path(series, knot_s, start);
+    }
   }
   for (MovingStart::Placed& camera : start.cameras)
     if (!camera.placed && camera.reason.empty()) camera.reason = "saw the target at no time when others did";
   return start;
+}
+
+}  // namespace
+
+MovingStart start_cameras(std::span<const ObservationSeries> series, double search_s, double knot_s,
+                          const Progress& progress) {
+  constexpr int max_starts = 4;
+  MovingStart best;
+  best.cameras.resize(series.size());
+  std::vector<ObservationPair> pairs = given_pairs(series, search_s, progress);
+  std::vector<ObservationPair> by_strength = pairs;
+  std::ranges::sort(by_strength, std::greater{}, start_strength);
+  int num_starts = 0;
+  for (const ObservationPair& pair : by_strength) {
+    if (pair.share < min_share || num_starts == max_starts || num_placed(best) == series.size()) break;
+    auto start = start_from(pair, series, pairs, search_s, knot_s, progress);
+    if (!start) continue;
+    ++num_starts;
+    if (num_placed(*start) > num_placed(best)) best = std::move(*start);
+  }
+  best.has_common = !pairs.empty();
+  best.best_share = by_strength.empty() ? 0.0 : by_strength.front().share;
+  return best;
 }
 
 }  // namespace alidade

@@ -197,53 +197,6 @@ void take_results(Placing& work) {
   }
 }
 
-/// Covariance of the heads by the names of a rig's, from that of the solver's parameters.
-Eigen::MatrixXd of_heads(const Placing& work, const Eigen::MatrixXd& common, double scale) {
-  const Eigen::Index num = num_head_params * static_cast<Eigen::Index>(work.heads.size());
-  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num, num);
-  for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    const Eigen::Index from_h = work.problem.first_param(h), to_h = num_head_params * static_cast<Eigen::Index>(h);
-    for (std::size_t k = 0; from_h >= 0 && k < work.heads.size(); ++k) {
-      const Eigen::Index from_k = work.problem.first_param(k), to_k = num_head_params * static_cast<Eigen::Index>(k);
-      if (from_k < 0) continue;
-      Eigen::Matrix<double, 6, 6> block = common.block<6, 6>(from_h, from_k);
-      block.topRows<3>() *= scale;
-      block.leftCols<3>() *= scale;
-      cov.block<6, 6>(to_h, to_k) = block;
-    }
-  }
-  return cov;
-}
-
-/// What is uncertain of the scale comes on top.
-void take_covariance(Placing& work, double scale, double sigma_scale) {
-  MovingTargetReport& report = work.report;
-  const MovingGiven given = moving_given(work.problem, work.solved, work.config);
-  report.assumed = given.assumed;
-  report.focals = given.focals;
-  report.rig.cov = of_heads(work, given.cov, scale);
-  report.cov_model = of_heads(work, work.solved.cov_model, scale);
-  const Eigen::Index num = report.rig.cov.rows();
-  Eigen::VectorXd by_scale = Eigen::VectorXd::Zero(num);
-  const MovingProblem& problem = work.problem;
-  const auto centre = [&](std::size_t h) { return cam_centre_in_world(report.rig.heads[h].head, problem.readings[h]); };
-  for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    const Eigen::Index to_h = num_head_params * static_cast<Eigen::Index>(h);
-    if (problem.first_param(h) < 0) continue;
-    by_scale.segment<3>(to_h) = report.rig.heads[h].head.world_from_base.rotation.conjugate() *
-                                (sigma_scale * (centre(h) - centre(problem.reference)));
-  }
-  report.rig.cov += by_scale * by_scale.transpose();
-  report.sigma_scale = sigma_scale;
-  for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
-    report.sigma_relative_m =
-        std::max(report.sigma_relative_m, std::sqrt(report.rig.cov.diagonal().segment<3>(at).sum()));
-    report.sigma_relative_rad =
-        std::max(report.sigma_relative_rad, std::sqrt(report.rig.cov.diagonal().segment<3>(at + 3).sum()));
-  }
-}
-
 /// World and clock become the true path's.
 void take_truth(Placing& work, const PathMatch& match) {
   MovingTargetReport& report = work.report;
@@ -276,7 +229,8 @@ void set_scale(Placing& work, const TrueTrack& truth) {
                            work.heads[work.problem.scale_first].head.id == work.config.distance->first &&
                            work.heads[work.problem.scale_second].head.id == work.config.distance->second;
     report.status = has_scale ? PlacedStatus::placed : PlacedStatus::no_scale;
-    take_covariance(work, 1.0, 0.0);
+    take_covariance(work.problem, moving_given(work.problem, work.solved, work.config), work.solved.cov_model, nullptr,
+                    report);
     report.sigma_scale = work.problem.scale_sigma;
     return;
   }
@@ -291,7 +245,8 @@ void set_scale(Placing& work, const TrueTrack& truth) {
     return;
   }
   take_truth(work, *match);
-  take_covariance(work, match->truth_from_path.scale, match->sigma_scale);
+  take_covariance(work.problem, moving_given(work.problem, work.solved, work.config), work.solved.cov_model, &*match,
+                  report);
   report.status = PlacedStatus::placed;
 }
 
@@ -378,8 +333,6 @@ MovingTargetReport place_cameras(std::span<const TargetObservation> observations
   const std::vector<TargetObservation> from_origin = moved_to(origin_s, observations);
   TrueTrack truth_from_origin = truth;
   for (double& t_s : truth_from_origin.t_s) t_s -= origin_s;
-  MovingTargetConfig one_clock = config;
-  one_clock.clock_search_s = 0.0;
   const auto placed = [&](std::span<const TargetObservation> some, std::span<const RigHead> given,
                           const TrueTrack& path, const MovingTargetConfig& with) {
     Placing work{some, given, with, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
@@ -389,10 +342,13 @@ MovingTargetReport place_cameras(std::span<const TargetObservation> observations
   MovingTargetReport report = placed(from_origin, heads, truth_from_origin, config);
   constexpr double max_search_s = 30.0;  // of clocks that are farther apart, each trial takes minutes
   if (report.camera_fault.empty() && config.clock_search_s <= max_search_s)
-    report.camera_fault =
-        camera_fault_of(report, from_origin, heads,
-                        [&](const std::vector<TargetObservation>& some, const std::vector<RigHead>& given,
-                            bool searches) { return placed(some, given, {}, searches ? config : one_clock); });
+    report.camera_fault = camera_fault_of(
+        report, from_origin, heads, config.clock_search_s,
+        [&](const std::vector<TargetObservation>& some, const std::vector<RigHead>& given, double clock_search_s) {
+          MovingTargetConfig with = config;
+          with.clock_search_s = clock_search_s;
+          return placed(some, given, {}, with);
+        });
   move_back(origin_s, report);
   return report;
 }

@@ -110,6 +110,24 @@ void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
   verdict.checks.push_back(agree);
 }
 
+/// Where σ is too large, of three cameras or more the one whose observations agree far worse than the others'.
+void put_worst_first(const MovingTargetReport& report, Verdict& verdict) {
+  constexpr double far_worse = 2.0;
+  std::vector<const LocatedCamera*> placed;
+  for (const LocatedCamera& camera : report.cameras)
+    if (camera.placed) placed.push_back(&camera);
+  const auto is_precise = [](const Check& check) { return check.state == State::good; };
+  if (placed.size() < 3 || std::ranges::all_of(verdict.checks, is_precise)) return;
+  std::ranges::sort(placed, std::ranges::greater{}, &LocatedCamera::sigma_px);
+  const double worst = placed[0]->sigma_px, next = placed[1]->sigma_px;
+  if (worst < far_worse * next) return;
+  verdict.checks.insert(verdict.checks.begin(), {"one camera", State::care,
+                                                 "head " + std::to_string(placed[0]->id) + " agrees to " +
+                                                     text_of(worst, 2) + " px, the others to " + text_of(next, 2) +
+                                                     " px or better: it was moved, or its clock or its lens is another",
+                                                 worst / next, far_worse, "", ""});
+}
+
 /// The lens that the observations contradict most.
 void add_focals(const MovingTargetReport& report, Verdict& verdict) {
   if (report.focals.empty()) return;
@@ -137,14 +155,19 @@ void add_truth(const MovingTargetReport& report, Verdict& verdict) {
 }  // namespace
 
 Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTargetConfig& config) {
+  if (report.camera_fault.starts_with("the clock of"))
+    return moving_refusal(report.camera_fault, "give --clocks SECONDS, which estimates each camera's clock");
   if (!report.camera_fault.empty())
     return moving_refusal(report.camera_fault,
                           "give images as the camera takes them (no mirror, no flip), and cameras in the order of the "
                           "heads' numbers");
   if (report.status != PlacedStatus::placed) return refusal_by_status(report, config);
   Verdict verdict;
-  add_focals(report, verdict);  // what is wrong comes before what follows from it
   add_precision(report, verdict);
+  put_worst_first(report, verdict);  // what is wrong comes before what follows from it
+  Verdict focals;
+  add_focals(report, focals);
+  verdict.checks.insert(verdict.checks.begin(), focals.checks.begin(), focals.checks.end());
   add_cameras(report, verdict);
   add_truth(report, verdict);
   const auto first = [&](State state) {

@@ -103,7 +103,7 @@ struct MovingTargetReport {
 struct NetworkCalibration : MovingTargetReport {
   std::vector<TargetObservation> observations;  ///< As given; `used` says what became of each.
   MovingTargetConfig config;
-  Eigen::MatrixXd covariance;                ///< Of all heads: rig.cov.
+  Eigen::MatrixXd covariance;                ///< Of the heads that were located: located_rig().cov.
   std::vector<std::string> parameter_names;  ///< Of `covariance`: "head1.base_x_m", …
   Counts counts;                             ///< Of observations.
   Verdict verdict;

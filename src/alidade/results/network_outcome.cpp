@@ -79,9 +79,11 @@ DataTable path_table(const MovingTargetReport& report) {
 
 void fill_placed(const NetworkCalibration& result, ResultDocument& document) {
   JsonValue& estimate = document.estimate;
-  fill_heads(result.rig, document);
+  // Of a camera that was not located there is nothing to say: it is missing, as in rig.yaml.
+  const Rig located = located_rig(result);
+  fill_heads(located, document);
   estimate["chi2_per_dof"] = result.chi2_per_dof;
-  fill_heads_model(result.rig, result.cov_model, document);
+  fill_heads_model(located, located_part(result, result.cov_model), document);
   document.assumed = result.assumed;
   estimate["design_effect"] = result.clusters.design_effect;
   estimate["block_s"] = result.block_s;

@@ -64,7 +64,7 @@ const char* const fault_help =
     "baseline (share of it), pan_zero1, pan_zero2, tilt_zero1, tilt_zero2 (rad), clock (s), time_step (of all heads' "
     "times, rounded down, s), clutter (share of the "
     "observations), second_target (share of the observations), swapped, mirrored, mirrored_all (of all heads), "
-    "pan_sign, tilt_sign, milliseconds (all times); rig.yaml then does not call itself exact";
+    "pan_sign, tilt_sign, milliseconds (all times), milliseconds2; rig.yaml then does not call itself exact";
 
 std::optional<double> number_of(const std::string& text) {
   double value = 0.0;
@@ -77,9 +77,13 @@ std::optional<double> number_of(const std::string& text) {
 void add_fault(const std::string& text, TrackFaults& faults) {
   const std::size_t colon = text.find(':');
   const std::string name = text.substr(0, colon);
-  const std::map<std::string, bool*> flags{
-      {"swapped", &faults.swapped},           {"mirrored", &faults.mirrored}, {"mirrored_all", &faults.mirrored_all},
-      {"milliseconds", &faults.milliseconds}, {"pan_sign", &faults.pan_sign}, {"tilt_sign", &faults.tilt_sign}};
+  const std::map<std::string, bool*> flags{{"swapped", &faults.swapped},
+                                           {"mirrored", &faults.mirrored},
+                                           {"mirrored_all", &faults.mirrored_all},
+                                           {"milliseconds", &faults.milliseconds},
+                                           {"milliseconds2", &faults.milliseconds_of_one},
+                                           {"pan_sign", &faults.pan_sign},
+                                           {"tilt_sign", &faults.tilt_sign}};
   if (const auto flag = flags.find(name); flag != flags.end() && colon == std::string::npos) {
     *flag->second = true;
     return;

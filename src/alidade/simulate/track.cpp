@@ -123,7 +123,8 @@ void spoil(const TrackScene& scene, Draws& draws, SimulatedObservation& observat
     if (faults.tilt_sign) observation.pan_tilt_rad.y() *= -1.0;
   }
   if (faults.swapped && observation.head < 2) observation.head = 1 - observation.head;
-  if (faults.milliseconds) observation.t_capture_s *= 1e3, observation.t_arrival_s *= 1e3;
+  if (faults.milliseconds || (faults.milliseconds_of_one && observation.head == 1))
+    observation.t_capture_s *= 1e3, observation.t_arrival_s *= 1e3;
 }
 
 void add_observations(const TrackScene& given, std::size_t head, std::uint64_t seed,
@@ -193,6 +194,24 @@ std::function<Eigen::Vector3d(double)> thrown_ball(const Eigen::Vector3d& from_m
   };
 }
 
+std::function<Eigen::Vector3d(double)> bouncing_ball(const Eigen::Vector3d& from_m, const Eigen::Vector3d& velocity_m_s,
+                                                     double floor_m, double restitution) {
+  constexpr double g = 9.80665;
+  return [=](double t_s) {
+    Vector3d p = from_m, v = velocity_m_s;
+    for (int bounce = 0; bounce < 100; ++bounce) {
+      const double fall_s = (-v.y() + std::sqrt(v.y() * v.y() + 2.0 * g * (floor_m - p.y()))) / g;
+      const double s = std::min(t_s, fall_s);
+      p += s * v + Vector3d(0.0, 0.5 * g * s * s, 0.0);
+      if (s == t_s) return p;
+      t_s -= s;
+      v.y() = -restitution * (v.y() + g * s);
+      p.y() = floor_m;
+    }
+    return p;
+  };
+}
+
 std::function<Vector3d(double)> drawn_path(const Vector3d& start_m, double sigma_a_m_s2, double duration_s,
                                            std::uint64_t seed) {
   Draws draws(seed + 77000);
@@ -215,7 +234,7 @@ std::function<Vector3d(double)> drawn_path(const Vector3d& start_m, double sigma
   };
 }
 
-std::vector<std::string> track_scenarios() { return {"A", "A2", "B", "C", "D", "E", "F", "G", "throw"}; }
+std::vector<std::string> track_scenarios() { return {"A", "A2", "B", "C", "D", "E", "F", "G", "throw", "bounce"}; }
 
 std::optional<TrackScene> track_scenario(std::string_view name) {
   if (std::ranges::count(track_scenarios(), name) == 0) return std::nullopt;
@@ -233,6 +252,13 @@ std::optional<TrackScene> track_scenario(std::string_view name) {
     scene.duration_s = 2.8;
     scene.aiming_lag_s = 0.05;
     scene.rate_hz = {60.0, 60.0};
+    scene.sigma_a_m_s2 = 10.0;
+  } else if (name == "bounce") {
+    scene.position = bouncing_ball({-0.6, -0.2, 3.0}, {0.3, 0.0, 0.05}, 0.5, 0.9);
+    scene.duration_s = 5.0;
+    scene.aiming_lag_s = 0.05;
+    scene.rate_hz = {25.0, 25.0};
+    scene.phase_s = {0.0, 0.019};
     scene.sigma_a_m_s2 = 10.0;
   } else {
     scene.position = manoeuvre_position;

@@ -36,6 +36,7 @@ struct TrackFaults {
   bool mirrored = false;  ///< Its images, left to right.
   bool mirrored_all = false;                 ///< Those of all heads.
   bool milliseconds = false;                 ///< All times are in them.
+  bool milliseconds_of_one = false;          ///< Its times are.
   bool pan_sign = false, tilt_sign = false;  ///< Its angles, reversed.
 };
 
@@ -66,7 +67,7 @@ struct SimulatedObservation {
 
 /// The scenarios by name: A (slow circle), A2 (the same, heads with offsets and rotated mountings), B (fast circle),
 /// C (manoeuvre), D (C, occluded), E (B, 100 ms late), F (C, 100 ms late), G (C, 20 and 30 images a second), throw
-/// (a ball at rest, thrown up at 4 m/s, caught, at rest). None for an unknown name.
+/// (a ball at rest, thrown up at 4 m/s, caught, at rest), bounce (a ball on the floor). None for an unknown name.
 [[nodiscard]] std::optional<TrackScene> track_scenario(std::string_view name);
 [[nodiscard]] std::vector<std::string> track_scenarios();
 
@@ -80,6 +81,11 @@ struct SimulatedObservation {
 /// its height.
 [[nodiscard]] std::function<Eigen::Vector3d(double t_s)> thrown_ball(const Eigen::Vector3d& from_m,
                                                                      const Eigen::Vector3d& velocity_m_s);
+
+/// A ball that falls, and returns from the floor (y of the world, which points down) with that share of its speed.
+[[nodiscard]] std::function<Eigen::Vector3d(double t_s)> bouncing_ball(const Eigen::Vector3d& from_m,
+                                                                       const Eigen::Vector3d& velocity_m_s,
+                                                                       double floor_m, double restitution);
 
 /// A path by white acceleration of ConstantVelocity{sigma_a}, drawn every 0.05 s and straight between.
 [[nodiscard]] std::function<Eigen::Vector3d(double t_s)> drawn_path(const Eigen::Vector3d& start_m, double sigma_a_m_s2,

@@ -138,6 +138,37 @@ TEST(TrackFaults, TimesInMillisecondsAreNamed) {
   }
 }
 
+/// They were "another head's", and the rest of the track a line to the end of the hours.
+TEST(TrackFaults, TimesOfOneHeadInMillisecondsAreNamed) {
+  for (const char* scenario : {"A2", "B", "G"}) {
+    const TrackScene scene = faulty(scenario, [](TrackFaults& f) { f.milliseconds_of_one = true; });
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+      const Verdict verdict = judged(scene, seed).verdict;
+      EXPECT_EQ(verdict.state, State::refused) << scenario << " " << seed;
+      EXPECT_NE(verdict.sentence.find("are its times milliseconds?"), std::string::npos)
+          << scenario << " " << seed << ": " << verdict.sentence;
+    }
+  }
+}
+
+/// It was noise, two targets, times that scatter, or a rig that is not as its file says.
+TEST(TrackFaults, ABallThatBouncesIsNamed) {
+  const TrackScene scene = *track_scenario("bounce");
+  for (const TargetMotion method : {TargetMotion::singer, TargetMotion::ballistic, TargetMotion::imm})
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      FollowConfig config;
+      config.tracker.method = method;
+      config.find_sigma_a = false;  // by an acceleration as large as a bounce's any motion is ordinary
+      config.tracker.sigma_a_m_s2 = method == TargetMotion::ballistic ? 0.3 : 10.0;
+      const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
+      const TrackReport report = track_target(observations, scene.heads, config, testing::truth_of(scene));
+      const Verdict verdict = track_verdict(report, observations, scene.heads, config);
+      EXPECT_GE(verdict.state, State::care) << motion_name(method) << " " << seed << ": " << verdict.sentence;
+      EXPECT_NE(verdict.sentence.find("as of one that bounces or is struck"), std::string::npos)
+          << motion_name(method) << " " << seed << ": " << verdict.sentence;
+    }
+}
+
 /// Draws of each scenario (ALIDADE_TEST_TRIALS=40: forty), the rig being what its file says, exactly. D hides the
 /// target from a head for two seconds, which is reported.
 TEST(TrackFaults, CleanScenariosAreGood) {

@@ -212,6 +212,19 @@ void inflate(TrackReport& report) {
   for (PredictedStep& step : report.smoothed) step.belief.P *= report.inflation;
 }
 
+/// Their path is one of the model cv: by a σ_a of another model that is too small for it, it seems to contradict the
+/// rig.
+RigTests rig_tests(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                   const FollowConfig& config, const TrackReport& report) {
+  RigTests tests = rig_faults(observations, heads, config.tracker);
+  const bool is_suspected = !tests.faults.empty() && tests.faults.front().z > max_fault_z(report);
+  if (!is_suspected || !config.find_sigma_a || config.tracker.method == TargetMotion::cv) return tests;
+  TrackerConfig cv = config.tracker;
+  cv.method = TargetMotion::cv;
+  cv.sigma_a_m_s2 = max_probable_sigma_a(observations, heads, cv, config.progress);
+  return cv.sigma_a_m_s2 > config.tracker.sigma_a_m_s2 ? rig_faults(observations, heads, cv) : tests;
+}
+
 /// What observations say of noise, motion and rig. Where the rig's errors are considered, by innovations of a filter
 /// that learns them.
 void judge_observations(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
@@ -225,7 +238,7 @@ void judge_observations(std::span<const TargetObservation> observations, std::sp
   report.nis_per_dof = mean_nis(steps, counted(steps, config.warm_up_s), config.tracker.gate);
   report.innovations = test_innovations(sorted, heads, steps, config);
   report.jitter = time_jitter(sorted, heads, steps, config.tracker.gate);
-  RigTests tests = rig_faults(sorted, heads, config.tracker);
+  RigTests tests = rig_tests(sorted, heads, config, report);
   report.faults = std::move(tests.faults);
   report.power = std::move(tests.power);
 }

@@ -300,7 +300,7 @@ std::optional<Check> falling_target(std::span<const TargetObservation> observati
   constexpr std::size_t max_observations = 1200;
   constexpr double min_gain = 20.0;
   const TargetMotion method = config.tracker.method;
-  if (method == TargetMotion::imm || method == TargetMotion::ballistic) return std::nullopt;
+  if (method == TargetMotion::imm) return std::nullopt;
   FollowConfig plain = config;
   plain.judge = false;
   const Observations some = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
@@ -313,15 +313,11 @@ std::optional<Check> falling_target(std::span<const TargetObservation> observati
   if (falls.num_starts == 0 || !(gain > min_gain) ||
       static_cast<double>(falls.num_used) < good_share * static_cast<double>(some.size()))
     return std::nullopt;
-  return Check{
-      "falls",
-      State::care,
-      "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
-          text_of(gain, 2) + ")",
-      gain,
-      min_gain,
-      "1",
-      "track"};
+  const std::string what = method == TargetMotion::ballistic
+                               ? "the target does not fall freely all the time, as one that bounces or is moved"
+                               : "the target moves as one that falls, or that is quiet and agile in turn";
+  return Check{"falls", State::care, what + ": --method imm (ln of the ratio " + text_of(gain, 2) + ")", gain, min_gain,
+               "1",     "track"};
 }
 
 }  // namespace alidade

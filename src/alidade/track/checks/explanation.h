@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "alidade/estimation/verdict.h"
 #include "alidade/track/track.h"
 
 namespace alidade {
@@ -48,8 +49,24 @@ struct Trial {
 [[nodiscard]] Explanation why_no_start(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                        const FollowConfig& config);
 
-/// Observations that do not fit, and do where the target may fall.
+/// Observations that do not fit, and do where the target may fall; or, where it is said to fall, may do else.
 [[nodiscard]] std::optional<Check> falling_target(std::span<const TargetObservation> observations,
                                                   std::span<const RigHead> heads, const FollowConfig& config);
+
+/// Tracks that ended and began again although the target was at one place: its velocity changed at once.
+struct VelocityJumps {
+  std::size_t num = 0;
+  double first_s = 0.0, first_m_s = 0.0;  ///< When the first one was, and by how much.
+};
+
+/// Most restarts are such that the path before and the path after, continued with gravity or without, meet between them
+/// with another velocity. None where there are fewer than two, or where most do not.
+[[nodiscard]] std::optional<VelocityJumps> velocity_jumps(std::span<const TrackStep> steps,
+                                                          const TrackerConfig& config);
+
+/// The check of it, "bounces".
+[[nodiscard]] Check velocity_jumps_check(const VelocityJumps& jumps);
+inline constexpr const char* velocity_jumps_remedy =
+    "leave out the positions from each jump to the new start, or give the rows between two jumps by themselves";
 
 }  // namespace alidade

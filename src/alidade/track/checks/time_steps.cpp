@@ -235,21 +235,30 @@ double usual_spacing_s(std::span<const TargetObservation> observations, std::siz
   return std::isfinite(least_s) ? least_s : 0.0;
 }
 
+/// How the observations fare at the times that `scaled` gives them, if they then fit and are far more probable.
+template <class Scaled>
+bool are_likelier(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                  const FollowConfig& config, const Scaled& scaled) {
+  constexpr std::size_t max_observations = 1200;
+  constexpr double min_gain = 30.0;
+  std::vector<TargetObservation> given(observations.begin(), observations.end());
+  for (TargetObservation& observation : given) scaled(observation);
+  given = with_shift(given, {});
+  given.resize(std::min(given.size(), max_observations));
+  const Trial as_that = tried(given, heads, config);
+  return as_that.fits &&
+         as_that.ln_p > tried(with_shift(observations.first(given.size()), {}), heads, config).ln_p + min_gain;
+}
+
 }  // namespace
 
 std::optional<Check> unit_of_times(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                    const FollowConfig& config) {
-  constexpr std::size_t max_observations = 1200;
-  constexpr double min_gain = 30.0;
   const double spacing_s = usual_spacing_s(observations, heads.size());
   const auto unit = time_unit_by_spacing(spacing_s);
-  if (!unit) return std::nullopt;
-  std::vector<TargetObservation> given =
-      with_shift(observations.first(std::min(observations.size(), max_observations)), {});
-  const double as_given = tried(given, heads, config).ln_p;
-  for (TargetObservation& observation : given) observation.t_capture_s *= unit->seconds;
-  const Trial as_that = tried(with_shift(given, {}), heads, config);
-  if (!as_that.fits || !(as_that.ln_p > as_given + min_gain)) return std::nullopt;
+  if (!unit ||
+      !are_likelier(observations, heads, config, [&](TargetObservation& o) { o.t_capture_s *= unit->seconds; }))
+    return std::nullopt;
   return Check{"times",
                State::care,
                "rows are " + text_of(spacing_s) + " s apart: are these " + unit->name + "? t_capture_s is in seconds",
@@ -257,6 +266,31 @@ std::optional<Check> unit_of_times(std::span<const TargetObservation> observatio
                1.0,
                "s",
                "track"};
+}
+
+std::optional<Check> units_of_heads_times(std::span<const TargetObservation> observations,
+                                          std::span<const RigHead> heads, const FollowConfig& config) {
+  if (time_unit_by_spacing(usual_spacing_s(observations, heads.size()))) return std::nullopt;
+  for (std::size_t head = 0; head < heads.size(); ++head) {
+    std::vector<TargetObservation> own(observations.begin(), observations.end());
+    std::erase_if(own, [head](const TargetObservation& observation) { return observation.head != head; });
+    const double spacing_s = usual_spacing_s(own, heads.size());
+    const auto unit = time_unit_by_spacing(spacing_s);
+    if (!unit || !are_likelier(observations, heads, config, [&](TargetObservation& o) {
+          if (o.head == head) o.t_capture_s *= unit->seconds;
+        }))
+      continue;
+    return Check{"times",
+                 State::bad,
+                 "rows of head " + std::to_string(heads[head].head.id) + " are " + text_of(spacing_s) +
+                     " s apart, those of the others " + text_of(usual_spacing_s(observations, heads.size())) +
+                     ": are its times " + unit->name + "? t_capture_s is in seconds",
+                 spacing_s,
+                 1.0,
+                 "s",
+                 "track"};
+  }
+  return std::nullopt;
 }
 
 }  // namespace alidade

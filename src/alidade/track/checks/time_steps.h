@@ -55,6 +55,9 @@ void count_rounding(double step_s, TrackReport& report);
 /// are far more probable. None: they are in seconds.
 [[nodiscard]] std::optional<Check> unit_of_times(std::span<const TargetObservation> observations,
                                                  std::span<const RigHead> heads, const FollowConfig& config);
+/// The same of one head, where the others' times are seconds.
+[[nodiscard]] std::optional<Check> units_of_heads_times(std::span<const TargetObservation> observations,
+                                                        std::span<const RigHead> heads, const FollowConfig& config);
 inline constexpr const char* unit_remedy = "give t_capture_s and t_arrival_s in seconds";
 
 }  // namespace alidade

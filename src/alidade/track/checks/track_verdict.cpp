@@ -172,6 +172,7 @@ struct Causes {
   std::optional<Check> second, falls;
   std::optional<ClockShift> shift;
   std::optional<OtherObject> other;
+  std::optional<VelocityJumps> jumps;
   double step_s = 0.0;  ///< Of all times, if rounding to it explains as much.
 };
 
@@ -193,6 +194,8 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   if (report.num_starts > 0 && !is_explained && report.frozen.empty() && is_doubtful(report))
     causes.other = other_object(observations, heads, config, report);
   if (causes.other) return causes;
+  if (report.num_restarts > 1) causes.jumps = velocity_jumps(report.steps, config.tracker);
+  if (causes.jumps && fits(report)) return causes;
   if (is_explained && !fits(report)) return causes;
   const bool is_odd = !fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected;
   const bool is_jitter = report.jitter && fits(report);
@@ -278,8 +281,8 @@ std::string sentence_of(const TrackReport& report, std::size_t num_given, const 
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
   // Beside what only says how bad it is, what it may come from.
-  constexpr std::array<std::string_view, 10> names{"frozen",  "other object",  "jitter", "times", "clocks",
-                                                   "mistake", "second target", "falls",  "rig",   "lean"};
+  constexpr std::array<std::string_view, 11> names{"frozen",  "other object",  "bounces", "jitter", "times", "clocks",
+                                                   "mistake", "second target", "falls",   "rig",    "lean"};
   const auto cause = std::ranges::find_if(
       verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
   if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
@@ -324,6 +327,7 @@ void set_frozen_remedy(const TrackReport& report, std::span<const RigHead> heads
 Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation> observations,
                    std::span<const RigHead> heads, const FollowConfig& config, std::size_t num_given) {
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
+  if (const auto unit = units_of_heads_times(observations, heads, config)) return refused({unit->text, unit_remedy});
   Causes causes = causes_of(report, observations, heads, config);
   if (!causes.mistake) causes.step_s = step_that_explains(observations, report, causes.shift);
   const auto unit = unit_of_times(observations, heads, config);
@@ -333,7 +337,8 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   if (unit) verdict.checks.push_back(*unit);
   add_frozen(report, heads, verdict);
   if (causes.other) add_other(*causes.other, heads, verdict);
-  if (report.jitter && !causes.mistake)
+  if (causes.jumps) verdict.checks.push_back(velocity_jumps_check(*causes.jumps));
+  if (report.jitter && !causes.mistake && !causes.jumps)
     verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
                                    1e3 * report.jitter->sigma_s, 0.0, "ms"));
   add_clocks(report, causes, heads, verdict);
@@ -350,6 +355,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   if (causes.mistake) verdict.to_add = causes.mistake->to_do;
   if (causes.other) verdict.to_add = other_object_remedy(*causes.other, heads);
+  if (causes.jumps) verdict.to_add = velocity_jumps_remedy;
   if (unit) verdict.to_add = unit_remedy;
   verdict.sentence = sentence_of(report, num_given, verdict);
   return verdict;

@@ -110,9 +110,11 @@ void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
   verdict.checks.push_back(agree);
 }
 
-/// Where σ is too large, of three cameras or more the one whose observations agree far worse than the others'.
+/// Where σ is too large: cameras that agree far worse than others, and of four or more which one. Of three, what one
+/// does the path takes over, and another agrees worst.
 void put_worst_first(const MovingTargetReport& report, Verdict& verdict) {
-  constexpr double far_worse = 2.0;
+  constexpr double far_worse = 3.0;
+  constexpr std::size_t enough = 4;
   std::vector<const LocatedCamera*> placed;
   for (const LocatedCamera& camera : report.cameras)
     if (camera.placed) placed.push_back(&camera);
@@ -121,10 +123,12 @@ void put_worst_first(const MovingTargetReport& report, Verdict& verdict) {
   std::ranges::sort(placed, std::ranges::greater{}, &LocatedCamera::sigma_px);
   const double worst = placed[0]->sigma_px, next = placed[1]->sigma_px;
   if (worst < far_worse * next) return;
+  const bool is_known = placed.size() >= enough;
+  const std::string who = is_known ? "head " + std::to_string(placed[0]->id) + " agrees" : "one camera agrees";
   verdict.checks.insert(verdict.checks.begin(), {"one camera", State::care,
-                                                 "head " + std::to_string(placed[0]->id) + " agrees to " +
-                                                     text_of(worst, 2) + " px, the others to " + text_of(next, 2) +
-                                                     " px or better: it was moved, or its clock or its lens is another",
+                                                 who + " to " + text_of(worst, 2) + " px only, the others to " +
+                                                     text_of(next, 2) + " px: " + (is_known ? "it" : "one of them") +
+                                                     " was moved, or its clock or its lens is another",
                                                  worst / next, far_worse, "", ""});
 }
 

@@ -21,6 +21,13 @@ struct HeadLies {
   std::string what;
 };
 
+/// Thrown where an axis may not go far enough to show anything.
+struct TooLittleRoom {
+  std::array<bool, 2> axes;
+};
+
+constexpr double long_way_rad = 1.9 * degree;  // far beyond any dead band
+
 /// One head, moved step by step, and what it reads meanwhile.
 class Experiment {
  public:
@@ -57,6 +64,8 @@ class Experiment {
       result_.zoom = try_zoom(head_);
     } catch (const HeadLies& lie) {
       result_.lie = lie.what;
+    } catch (const TooLittleRoom& room) {
+      result_.cramped = room.axes;
     }
     head_.stop();
     result_.head_time_s = head_.now_s() - begin_s_;
@@ -110,7 +119,6 @@ class Experiment {
   }
   /// A reading that stands through several commands, each far beyond any dead band, is none.
   void heed_standing(int axis, double before, std::size_t first) {
-    constexpr double long_way_rad = 1.9 * degree;
     constexpr int most = 3;
     const PositionerLog& it = log(axis);
     const double way = it.commands.back().target_rad - before;
@@ -140,21 +148,30 @@ class Experiment {
   /// A few degrees: how fast is it, roughly, and how late? What is not known yet is not used.
   void wake() {
     const Eigen::Vector2d span = window_high_ - window_low_;
+    if (!(span.minCoeff() > 0.0)) throw TooLittleRoom{{!(span[0] > 0.0), !(span[1] > 0.0)}};
     Eigen::Vector2d in = start_.cwiseMax(window_low_).cwiseMin(window_high_);
     for (int i = 0; i < 2; ++i) toward_[i] = in[i] < 0.5 * (window_low_[i] + window_high_[i]) ? 1.0 : -1.0;
     const Eigen::Vector2d step = toward_.cwiseProduct(span.cwiseMin(6.0 * degree) * 0.5);
     patience_s_ = 0.7;
     const std::size_t begin = log(0).readings.size();
     move_to(in + step);
+    heed_no_motion(step);
+    for (int i = 0; i < 2; ++i) slow_rate_[i] = slowest_rate(log(i), begin);
+    for (PositionerLog& axis : result_.logs) axis.used_from_s = head_.now_s();
+  }
+  /// A short step that is not followed may be within a dead band; a long one is not.
+  void heed_no_motion(const Eigen::Vector2d& step) {
+    std::array<bool, 2> is_still{};
     for (int i = 0; i < 2; ++i) {
-      const PositionerLog& axis = log(i);
-      if (std::abs(axis.readings.back().angle_rad - axis.readings.front().angle_rad) < 0.25 * std::abs(step[i]))
+      const std::vector<PositionerReading>& readings = log(i).readings;
+      if (std::abs(readings.back().angle_rad - readings.front().angle_rad) >= 0.25 * std::abs(step[i])) continue;
+      if (std::abs(step[i]) >= long_way_rad)
         throw HeadLies{fmt::format(
             "{} took a command of {:.2f}° and did not move: positions are refused silently, or its reading is frozen",
             head_axis_names[static_cast<std::size_t>(i)], std::abs(step[i]) / degree)};
-      slow_rate_[i] = slowest_rate(axis, begin);
+      is_still[static_cast<std::size_t>(i)] = true;
     }
-    for (PositionerLog& axis : result_.logs) axis.used_from_s = head_.now_s();
+    if (is_still[0] || is_still[1]) throw TooLittleRoom{is_still};
   }
   /// Of a move of 3°: the mean while it moved.
   static double slowest_rate(const PositionerLog& axis, std::size_t begin) {
@@ -231,7 +248,8 @@ class Experiment {
     move_to(centre);
   }
 
-  /// Halves the step, each axis by itself, until the smallest that is obeyed is known to a tenth.
+  /// Halves the step, each axis by itself, until the smallest that is obeyed is known to a tenth. An axis that has no
+  /// room left stands, and the other goes on.
   void small_steps() {
     constexpr int trials = 9;
     const Eigen::Vector2d grain(reading_step(log(0).readings), reading_step(log(1).readings));
@@ -242,10 +260,13 @@ class Experiment {
     for (int trial = 0; trial < trials; ++trial) {
       const Eigen::Vector2d before = last().pan_tilt_rad;
       for (int i = 0; i < 2; ++i)
-        if (at[i] + 2.0 * toward_[i] * step[i] < low_[i] || at[i] + 2.0 * toward_[i] * step[i] > high_[i]) return;
+        if (at[i] + 2.0 * toward_[i] * step[i] < low_[i] || at[i] + 2.0 * toward_[i] * step[i] > high_[i])
+          step[i] = 0.0;
+      if (step.isZero(0.0)) return;
       at += toward_.cwiseProduct(step);
       move_to(at);
       for (int i = 0; i < 2; ++i) {
+        if (step[i] == 0.0) continue;
         const bool moved = std::abs(last().pan_tilt_rad[i] - before[i]) > 0.4 * step[i];
         if (moved) {
           obeyed[i] = step[i];
@@ -292,9 +313,14 @@ HeadIdentification identify_head(HeadDevice& device, const HeadRange& range, con
       throw InputError(device.name() + ": names no limits; give --pan-range and --tilt-range");
     result.low_rad = head.low_rad();
     result.high_rad = head.high_rad();
+    const HeadLimits own = device.limits();
+    for (int i = 0; i < 2; ++i)
+      result.at_own_limits[static_cast<std::size_t>(i)] =
+          result.low_rad[i] == own.low_rad[i] && result.high_rad[i] == own.high_rad[i];
     Experiment(head, result, progress).run();
   }
-  for (std::size_t i = 0; i < 2 && result.lie.empty(); ++i) {
+  const bool has_moved = result.lie.empty() && !result.cramped[0] && !result.cramped[1];
+  for (std::size_t i = 0; i < 2 && has_moved; ++i) {
     report_progress(progress, "fitting: axis", i + 1, 2);
     result.axes[i] = fit_positioner(result.logs[i]);
   }

@@ -14,8 +14,10 @@ struct HeadIdentification {
   std::array<PositionerLog, 2> logs;
   std::array<PositionerFit, 2> axes;
   double head_time_s = 0.0;
-  Eigen::Vector2d low_rad, high_rad;  ///< Where it was allowed to go.
-  std::string lie;                    ///< Why nothing can be determined; empty: it can.
+  Eigen::Vector2d low_rad, high_rad;    ///< Where it was allowed to go.
+  std::array<bool, 2> at_own_limits{};  ///< An axis' range is the head's own: no option widens it.
+  std::string lie;                      ///< Why nothing can be determined; empty: it can.
+  std::array<bool, 2> cramped{};        ///< It could not be moved within its range: nothing else is determined.
   ZoomTrial zoom;
   Verdict verdict;
 };

@@ -63,14 +63,48 @@ void check_grid(const PositionerLog& log, const PositionerFit& fit, const std::s
                     grid / degree, coarse_rad / degree, "°", ""});
 }
 
-Verdict refusal_of(const std::string& axis, const PositionerFit& fit) {
+/// The options of the axes that lack room; where their range is the head's own, that no option helps.
+std::string more_room(const HeadIdentification& identified, const std::array<bool, 2>& lacks) {
+  std::string options, own;
+  const auto add = [](std::string& text, const std::string& what) { text += (text.empty() ? "" : " and ") + what; };
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string axis = head_axis_names[i];
+    if (!lacks[i]) continue;
+    if (identified.at_own_limits[i])
+      add(own, axis);
+    else
+      add(options, "--" + axis + "-range LOW,HIGH");
+  }
+  if (!options.empty()) return "give it more room: " + options;
+  return own.empty() ? "" : "the head's own limits leave " + own + " no more room";
+}
+
+Verdict refusal_of(const HeadIdentification& identified, std::size_t i) {
+  const std::string axis = head_axis_names[i];
   Verdict verdict;
   verdict.state = State::refused;
   verdict.exit_code = ExitCode::undetermined;
-  verdict.sentence = fit.status == PositionerFit::Status::no_motion
+  verdict.sentence = identified.axes[i].status == PositionerFit::Status::no_motion
                          ? axis + " does not move: commands are taken, and the reading is frozen"
                          : axis + ": too few readings";
-  verdict.to_add = "give it more room: --" + axis + "-range LOW,HIGH";
+  verdict.to_add = more_room(identified, {i == 0, i == 1});
+  return verdict;
+}
+
+/// It was not allowed to go as far as would show anything: no fault of the head's is seen.
+Verdict cramped_verdict(const HeadIdentification& identified) {
+  Verdict verdict;
+  verdict.state = State::refused;
+  verdict.exit_code = ExitCode::undetermined;
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    if (!identified.cramped[static_cast<std::size_t>(i)]) continue;
+    const double low = identified.low_rad[i] / degree, high = identified.high_rad[i] / degree;
+    verdict.sentence += fmt::format(
+        "{}{} {} between {:.4g}° and {:.4g}°", verdict.sentence.empty() ? "" : "; ",
+        head_axis_names[static_cast<std::size_t>(i)],
+        high > low ? "did not move, and had too little room to show why," : "has no room to move", low, high);
+  }
+  verdict.to_add = more_room(identified, identified.cramped);
   return verdict;
 }
 
@@ -108,6 +142,8 @@ double command_step(const PositionerLog& log) {
 
 namespace {
 
+bool lacks_room(const PositionerFit& fit) { return !fit.reached_rate || !std::isfinite(fit.dead_band.sigma); }
+
 void judge_axis(const HeadIdentification& identified, std::size_t i, Verdict& verdict) {
   const PositionerFit& fit = identified.axes[i];
   const std::string axis = head_axis_names[i], missing = not_given(fit);
@@ -116,11 +152,9 @@ void judge_axis(const HeadIdentification& identified, std::size_t i, Verdict& ve
   verdict.sentence += fmt::format("{}{} follows at up to {:.4g}°/s, {:.3g} ms late", i == 0 ? "" : "; ", axis,
                                   fit.rate.value / degree, 1e3 * fit.latency.value);
   if (!fit.reached_rate) verdict.sentence += ", and had no way to reach its largest rate";
-  const bool lacks = !fit.reached_rate || !std::isfinite(fit.dead_band.sigma);
   verdict.checks.push_back(
-      {axis + " excitation", lacks ? State::care : State::good,
+      {axis + " excitation", lacks_room(fit) ? State::care : State::good,
        missing.empty() ? axis + ": all of the model was excited" : axis + ": the log does not show " + missing});
-  if (lacks) verdict.to_add = "give it more room: --" + axis + "-range LOW,HIGH";
 }
 
 /// The worst check's state. What is wrong comes first; of values that are not to be trusted nothing is said.
@@ -155,10 +189,11 @@ Verdict head_verdict(const HeadIdentification& identified) {
     verdict.to_add = "look whether it moves; mend that first";
     return verdict;
   }
+  if (identified.cramped[0] || identified.cramped[1]) return cramped_verdict(identified);
   for (std::size_t i = 0; i < 2; ++i)
-    if (identified.axes[i].status != PositionerFit::Status::ok)
-      return refusal_of(head_axis_names[i], identified.axes[i]);
+    if (identified.axes[i].status != PositionerFit::Status::ok) return refusal_of(identified, i);
   for (std::size_t i = 0; i < 2; ++i) judge_axis(identified, i, verdict);
+  verdict.to_add = more_room(identified, {lacks_room(identified.axes[0]), lacks_room(identified.axes[1])});
   sum_up(verdict);
   judge_zoom(identified.zoom, verdict);
   return verdict;

@@ -210,6 +210,33 @@ TEST(Heads, LiesAreNamed) {
   }
 }
 
+/// Advice names the axis that lacks room; one that may not move is not said to be frozen, and is not moved.
+TEST(Heads, AnAxisWithoutRoomIsNamedWithItsOwnOption) {
+  const auto in_pan = [](const std::string& words, double low_deg, double high_deg) {
+    WatchedHead head("sim://?clock=free" + words);
+    HeadRange range;
+    range.low_rad[0] = low_deg * degree, range.high_rad[0] = high_deg * degree;
+    const HeadIdentification given = identify_head(head, range);
+    EXPECT_TRUE(high_deg > low_deg || head.commands == 0) << head.commands;
+    return given;
+  };
+  const HeadIdentification narrow = in_pan("", 0.0, 3.0);
+  EXPECT_TRUE(narrow.verdict.ok()) << narrow.verdict.sentence;
+  EXPECT_NE(narrow.verdict.sentence.find("pan"), std::string::npos);
+  EXPECT_EQ(narrow.verdict.to_add, "give it more room: --pan-range LOW,HIGH");
+  EXPECT_TRUE(std::isfinite(narrow.axes[1].dead_band.sigma)) << "tilt has all the room that it needs";
+  const HeadIdentification none = in_pan("", 0.0, 0.0);
+  EXPECT_EQ(none.verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(none.verdict.sentence, "pan has no room to move between 0° and 0°");
+  EXPECT_EQ(none.verdict.to_add, "give it more room: --pan-range LOW,HIGH");
+  const HeadIdentification within_dead_band = in_pan("&dead_band=0.5", 0.0, 0.4);
+  EXPECT_EQ(within_dead_band.verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(within_dead_band.verdict.sentence,
+            "pan did not move, and had too little room to show why, between 0° and 0.4°");
+  const HeadIdentification own = in_pan("&min_pan=-2&max_pan=2", -1e9, 1e9);
+  EXPECT_EQ(own.verdict.to_add, "the head's own limits leave pan no more room");
+}
+
 TEST(Heads, HonestOnesAreNotAccused) {
   for (const std::string head : {"dead_band=0.2&backlash=0.3", "step=0.05&update_hz=20", "zoom=1", "repeat=0.05"}) {
     const HeadIdentification given = identified(head);

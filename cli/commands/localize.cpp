@@ -1,7 +1,11 @@
 #include "alidade/localize.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <opencv2/core.hpp>
 
@@ -277,6 +281,28 @@ Localization localize_images(LocalizeArgs args, const FrameByFrame& given, std::
   return localize_growing(args.sequence, rate_hz, *args.wait_s, watched);
 }
 
+/// A truth of other times, or of fewer poses than can be aligned, was given in error: that is said in place of a result
+/// without a word of it.
+void require_same_times(const std::filesystem::path& file, const Localization& result) {
+  constexpr std::size_t fewest = 3;
+  const auto num_posed = static_cast<std::size_t>(
+      std::ranges::count_if(result.path, [](const PathStep& step) { return step.has_pose(); }));
+  const std::size_t num_pairs = result.error.num_pairs;
+  if (result.truth.empty() || num_pairs >= fewest || num_posed < fewest) return;
+  throw InputError(fmt::format(
+      "{}: is not of the path's times: {:.3f} to {:.3f} s, the path's are {:.3f} to {:.3f} s; {} of {} frames have a "
+      "pose of their time in it, {} are needed",
+      file.string(), result.truth.front().t_s, result.truth.back().t_s, result.path.front().t_s, result.path.back().t_s,
+      num_pairs, num_posed, fewest));
+}
+
+/// Where there is a truth and no ATE: why.
+void note_unaligned(const Localization& result, JobOutcome& outcome) {
+  if (result.error.num_pairs == 0 || std::isfinite(result.error.ate_m)) return;
+  outcome.lines.push_back(
+      "against the truth: no ATE, as positions at fewer than three times, or along one line, are not aligned");
+}
+
 ExitCode run_localize(LocalizeArgs args, Run& run) {
   add_inputs(args, run);
   const Camera camera = read_camera(args.camera);
@@ -302,7 +328,9 @@ ExitCode run_localize(LocalizeArgs args, Run& run) {
                                                  : localize_table(args, camera, truth, live, run);
   if (live.server() != nullptr && !result.path.empty()) stream.show(*live.server(), result.path.back(), true);
   run.lap("localize");
+  if (is_estimate(static_cast<int>(result.verdict.exit_code))) require_same_times(args.truth, result);
   JobOutcome outcome = outcome_of(result);
+  note_unaligned(result, outcome);
   add_skipped(args.skipped, outcome);
   if (seen) seen->add_to(outcome);
   return live.finish(std::move(outcome));

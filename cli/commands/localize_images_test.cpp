@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "alidade/files/files.h"
+#include "alidade/tables/localize_file.h"
 #include "alidade/testing/command_test.h"
 
 namespace alidade {
@@ -109,6 +110,21 @@ TEST_F(LocalizeImageFolders, WhatShowsNothingIsRefused) {
   expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 images");
   for (int i = 0; i < num_frames; ++i) cv::imwrite(frame(i), cv::Mat::zeros(576, 768, CV_8U));
   expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 images");
+}
+
+/// A truth that nothing can be compared with is no truth of this path: it is named with both times, and nothing is
+/// left.
+TEST_F(LocalizeImageFolders, ATruthOfOtherTimesIsRefused) {
+  std::vector<TimedPose> truth = read_tum(path("sim/truth.tum"));
+  for (TimedPose& pose : truth) pose.t_s += 1000.0;
+  write_file(path("sim/truth.tum"), tum_text(truth));
+  expect_refused("sim/frames", {"--rate", "30"}, 3,
+                 "truth.tum: is not of the path's times: 1000.000 to 1000.367 s, the path's are 0.000 to 0.367 s; 0 of "
+                 "12 frames have a pose of their time in it");
+  for (TimedPose& pose : truth) pose.t_s -= 1000.0;
+  truth.resize(2);
+  write_file(path("sim/truth.tum"), tum_text(truth));
+  expect_refused("sim/frames", {"--rate", "30"}, 3, "2 of 12 frames have a pose of their time in it, 3 are needed");
 }
 
 /// Clean rendered images are matched better than real ones: the verdict says so, and what to tell.

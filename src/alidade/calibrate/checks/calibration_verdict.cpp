@@ -328,6 +328,7 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
   }
   if (ails("one lens"))
     return "add photos with the board tilted 30–45° and turned about its own axis, or hold k3: --fix k3";
+  if (!study.halves) return "add photos: from six on two halves are compared";
   return ails("consistent") ? "add photos: the halves do not agree" : "";
 }
 

@@ -206,6 +206,20 @@ TEST(CalibrationVerdict, TwoCamerasInOneSetAreNotGood) {
   EXPECT_NE(sample_calibration(halves).verdict.state, State::good);
 }
 
+/// Halves that were not compared are not said to differ.
+TEST(CalibrationVerdict, AdviceOnHalvesIsOfWhatWasCompared) {
+  auto views = clean_views(1);
+  views.resize(6);
+  EXPECT_TRUE(sample_calibration(views).study.halves);
+  views.resize(5);
+  const Calibration few = sample_calibration(views);
+  ASSERT_FALSE(few.study.halves);
+  EXPECT_EQ(check_named(few.verdict, "consistent").text, "too few photos to compare two halves");
+  // Without a photo to propose: this is what is left to advise.
+  const Verdict verdict = calibration_verdict(few, few.study, views, few.config, {});
+  EXPECT_EQ(verdict.to_add, "add photos: from six on two halves are compared");
+}
+
 TEST(CalibrationVerdict, ARefusalSaysWhatToAdd) {
   auto views = clean_views(1);
   views.resize(2);

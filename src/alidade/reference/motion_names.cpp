@@ -64,7 +64,18 @@ heads[].
   encoder.tilt_cos_rad               rad    eccentricity
   encoder.tilt_sin_rad               rad    eccentricity
   encoder.sigma_rad                  rad    of a reading
-cameras[]      any  of static cameras: pose and σ of each
+cameras[].
+  id                count  head, of a moving target
+  placed            flag   located
+  reason            text   why not
+  sights            count  observations by it
+  used              count  those solved for: at equal spacing, four or fewer per knot of the path; none beyond 5σ
+  clock_offset_s    s      time of the rig − rate · its own time
+  clock_rate        1      of the rig's time over its own
+  sigma_clock_s     s      of its clock amid its observations
+  sigma_clock_rate  1      of its rate
+  sigma_px          px     of a coordinate
+  rms_px            px     of an observation's residual
 estimated[].
   name   text  value that was estimated beside the poses
   value  1     estimate

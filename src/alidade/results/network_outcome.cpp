@@ -116,11 +116,12 @@ void add_lines_of_camera(const NetworkCalibration& result, std::size_t h, std::v
   const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
   const Eigen::Vector3d& position = result.rig.heads[h].head.world_from_base.translation;
   const HeadVector sigma = 3.0 * result.rig.cov.diagonal().segment<num_head_params>(at).cwiseMax(0.0).cwiseSqrt();
-  lines.push_back(fmt::format(
-      "head {}: at ({:.2f}, {:.2f}, {:.2f}) m ± {:.2g} m, ± {:.2g}°   (3σ), {} of {} observations, σ {:.2g} px",
-      camera.id, position.x(), position.y(), position.z(), sigma.head<3>().norm(),
-      sigma.segment<3>(base_rotation_param).norm() / degree, camera.num_used, camera.num_observations,
-      camera.sigma_px));
+  lines.push_back(
+      fmt::format("head {}: at ({:.2f}, {:.2f}, {:.2f}) m ± {:.2g} m, ± {:.2g}°   (3σ), {} of {} observations solved "
+                  "for, σ {:.2g} px",
+                  camera.id, position.x(), position.y(), position.z(), sigma.head<3>().norm(),
+                  sigma.segment<3>(base_rotation_param).norm() / degree, camera.num_used, camera.num_observations,
+                  camera.sigma_px));
   lines.push_back(fmt::format("  its clock: time of the rig = {:.4f} s + {:.6f} · its own, ± {:.2g} s (3σ)",
                               camera.clock.offset_s, camera.clock.rate, 3.0 * camera.sigma_clock_s));
 }

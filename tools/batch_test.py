@@ -103,6 +103,24 @@ class Batch(unittest.TestCase):
         for file, stamp in stamps.items():
             self.assertEqual(file.stat().st_mtime_ns, stamp, file)
 
+    def test_what_a_stopped_lot_says_is_there(self):
+        quick = f'quick,"observe ""{self.made}/cam 1/log.csv"" --size 780x582"'
+        slow = "slow,head sim:// --identify --move"  # half a minute of a head
+        for rows, folders, said in (([slow], 0, "before a row was done"), ([quick, slow], 1, "1 row is in")):
+            (self.folder / "jobs.csv").write_text("camera,arguments\n" + "\n".join(rows) + "\n")
+            running = subprocess.Popen([ALIDADE, "batch", "jobs.csv", "--out", f"stopped{folders}", "--threads", "1"], cwd=self.folder,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            begin = time.monotonic()
+            while len(list(self.folder.glob(f"stopped{folders}/rows/*/row.json"))) < folders and time.monotonic() - begin < 20:
+                time.sleep(0.01)
+            time.sleep(1.0)
+            running.send_signal(signal.SIGTERM)
+            words = running.communicate()[1]
+            self.assertEqual(running.returncode, 143, words)
+            self.assertIn(said, words)
+            self.assertEqual("--resume" in words, folders > 0, words)
+            self.assertEqual(len(list(self.folder.glob(f"stopped{folders}/rows/*/row.json"))), folders)
+
     def test_an_upgrade_in_the_middle_of_a_lot(self):
         own = self.folder / "alidade"
         shutil.copy2(ALIDADE, own)

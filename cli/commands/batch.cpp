@@ -184,8 +184,10 @@ ExitCode run_batch(const BatchArgs& args, Run& run) {
   try {
     lot.work(shard);
   } catch (const Interrupted&) {
-    throw Interrupted("interrupted; the rows that were done are in " + (run.options.out / "rows").string() +
-                      ": go on with --resume");
+    const std::size_t done = lot.rows().size();
+    if (done == 0) throw Interrupted("interrupted before a row was done: nothing is kept");
+    throw Interrupted(fmt::format("interrupted; {} {} in {}: go on with --resume", done,
+                                  done == 1 ? "row is" : "rows are", (run.options.out / "rows").string()));
   }
   run.lap("rows");
   lot.remove_earlier_rows();

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <sstream>
 
 #include "alidade/testing/process.h"
@@ -116,6 +117,21 @@ TEST(Executable, HelpIsACommandToo) {
   const Outcome outcome = run_alidade({"help", "camera", "show"});
   EXPECT_EQ(outcome.code, 0);
   EXPECT_EQ(outcome.out, run_alidade({"camera", "show", "--help"}).out);
+}
+
+/// Half of a camera's observations are not solved for by design: the schema says so.
+TEST(Executable, TheSchemaOfRigSaysWhichObservationsOfAMovingTargetAreUsed) {
+  EXPECT_THAT(run_alidade({"schema", "rig"}).out, HasSubstr("four or fewer per knot of the path"));
+}
+
+/// The program for fleets may be missing for any reason: what is said is where it was looked for.
+TEST(Executable, AFleetWithoutItsProgramSaysWhereItWasLookedFor) {
+  const testing::TemporaryFolder folder;
+  const std::filesystem::path alone = folder.path() / "alidade";
+  std::filesystem::copy_file(ALIDADE_EXECUTABLE, alone);
+  const Outcome outcome = run_program({alone.string(), "fleet", "worker", "--size", "640x480"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr((folder.path() / "alidade-fleet").string() + ": is not there"));
 }
 
 TEST(Executable, AnOptionWithoutItsValueSaysWhatItTakes) {

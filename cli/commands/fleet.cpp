@@ -24,9 +24,9 @@ namespace {
   std::error_code error;
   const std::filesystem::path program = own_executable().parent_path() / "alidade-fleet";
   if (!std::filesystem::is_regular_file(program, error)) {
-    throw InputError(
-        "fleets are run by the program 'alidade-fleet', which is not beside this one: alidade was built "
-        "without libnats (Debian: libnats-dev)");
+    throw InputError(program.string() +
+                     ": is not there; this program runs fleets, and is installed beside alidade where that is built "
+                     "with libnats (Debian: libnats-dev)");
   }
   std::vector<std::string> words = run.document.argv;
   words.front() = program.string();

@@ -71,6 +71,17 @@ class Study(Folder):
             self.assertAlmostEqual(one["coverage"]["2"], 0.954, delta=0.015)
         self.assertEqual(len(estimate["worst"]), 10)
 
+    def test_too_few_trials_are_not_good(self):
+        # Inside 1σ: 3 √(0.6827 · 0.3173 / n) ≤ 0.04 from n = 1219 on; 2σ, 3σ and the RMS need fewer.
+        for trials, state, says in ((5, "care", "too few to tell"), (1218, "care", "too few to tell"), (1219, "good", "σ covers them"), (3000, "good", "σ covers them")):
+            self.study("one", what=["observe", "--trials", trials, "--seed", "9", "--quiet", "--no-report"])
+            verdict = json.loads((self.folder / "one/result.json").read_text())["verdict"]
+            self.assertEqual(verdict["state"], state, verdict)
+            self.assertIn(says, verdict["sentence"])
+            self.assertEqual(verdict["exit_code"], 0)
+            if state == "care":
+                self.assertIn("--trials 1219", verdict["to_add"])
+
     def test_shards_merge_to_the_same_bytes(self):
         whole = self.study("whole")
         for shards in (1, 2, 64):

@@ -18,7 +18,7 @@ namespace {
 
 /// What every study has.
 struct StudyOptions {
-  std::uint64_t trials = 1000, block = 0;
+  std::uint64_t trials = 2000, block = 0;
   std::string shard, vary;
   std::optional<std::uint64_t> trial;
   bool resume = false;

@@ -146,6 +146,28 @@ std::string fault_of(const StudyHeader& header, const StudyTally& tally, std::si
   return "";
 }
 
+/// Values of a quantity with which three standard errors are within the tolerances: fewer do not show that it is at the
+/// bound and covered.
+double values_needed() {
+  double most = 0.5 * std::pow(3.0 * largest_ratio / (largest_ratio - 1.0), 2);
+  for (std::size_t k = 0; k < 3; ++k)
+    most = std::max(most, 9.0 * normal[k] * (1.0 - normal[k]) / (allowance[k] * allowance[k]));
+  return std::ceil(most);
+}
+
+/// Trials that give each quantity so many values; 0 where these do.
+std::uint64_t trials_needed(std::span<const StudyTally> points) {
+  const double values = values_needed();
+  double most = 0.0;
+  for (const StudyTally& tally : points) {
+    for (const QuantityTally& quantity : tally.quantities) {
+      const auto n = static_cast<double>(quantity.values);
+      if (n > 0.0 && n < values) most = std::max(most, std::ceil(static_cast<double>(tally.trials) * values / n));
+    }
+  }
+  return static_cast<std::uint64_t>(most);
+}
+
 Verdict verdict_of(const StudyHeader& header, std::span<const StudyTally> points, const Shard& shard) {
   Verdict verdict;
   std::uint64_t trials = 0, estimates = 0;
@@ -169,6 +191,13 @@ Verdict verdict_of(const StudyHeader& header, std::span<const StudyTally> points
     verdict.state = State::care;
     verdict.sentence = fmt::format("{} trials of {}; not as it should be: {}", trials, header.study, fault);
     verdict.to_add = "look at the worst: --trial N";
+  } else if (const std::uint64_t needed = trials_needed(points); needed > 0) {
+    verdict.state = State::care;
+    verdict.sentence =
+        fmt::format("{} trials of {}: too few to tell whether {}; no departure is seen", trials, header.study,
+                    header.has_bound ? "errors are at the bound and σ covers them" : "σ covers the errors");
+    verdict.to_add = fmt::format("--trials {}: three standard errors are then within the tolerance, {:g} % inside 1σ",
+                                 needed, 100.0 * allowance[0]);
   } else {
     verdict.sentence = fmt::format("{} trials of {}: errors are at the bound, and σ covers them", trials, header.study);
     if (!header.has_bound) verdict.sentence = fmt::format("{} trials of {}: σ covers the errors", trials, header.study);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "alidade/localize/checks/judge.h"
 
@@ -8,6 +9,10 @@ namespace alidade {
 namespace {
 
 constexpr double ordinary_focal = 0.003, ordinary_centre_px = 2.0, ordinary_scale = 0.002, ordinary_clock_s = 0.001;
+constexpr double ordinary_water = 0.003;  // fresh or salt, warm or cold
+constexpr double ordinary_gap_m = 0.002, ordinary_normal = 0.005;
+constexpr const char* remedy_port =
+    "calibrate lens and port together, in this water (alidade calibrate --model flat_port)";
 constexpr const char* remedy_camera = "use a camera file with its covariance (alidade calibrate writes one)";
 
 struct Named {
@@ -15,17 +20,32 @@ struct Named {
   const char* name;
   double ordinary;
 };
-constexpr std::array<Named, 5> all_named{{{"focal length", "camera.f (relative)", ordinary_focal},
+constexpr std::array<Named, 9> all_named{{{"focal length", "camera.f (relative)", ordinary_focal},
                                           {"centre u", "camera.cx", ordinary_centre_px},
                                           {"centre v", "camera.cy", ordinary_centre_px},
                                           {"scale of the target", "target.scale", ordinary_scale},
-                                          {"clock", "times (s)", ordinary_clock_s}}};
+                                          {"clock", "times (s)", ordinary_clock_s},
+                                          {"water's index", "camera.n_water", ordinary_water},
+                                          {"port's gap", "camera.gap_m", ordinary_gap_m},
+                                          {"port's normal x", "camera.normal_x", ordinary_normal},
+                                          {"port's normal y", "camera.normal_y", ordinary_normal}}};
+
+/// Parameters of the lens by the names of what is given.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 6> lens_names{{{"centre u", "cx"},
+                                                                                   {"centre v", "cy"},
+                                                                                   {"water's index", "n_water"},
+                                                                                   {"port's gap", "gap_m"},
+                                                                                   {"port's normal x", "normal_x"},
+                                                                                   {"port's normal y", "normal_y"}}};
 
 double value_of(std::string_view given, const Camera& camera) {
-  const Eigen::VectorXd lens = params(camera.lens);
   if (given == "scale of the target") return 1.0;
   if (given == "clock") return 0.0;
-  return given == "centre u" ? lens[2] : given == "centre v" ? lens[3] : lens[0];
+  const Eigen::VectorXd lens = params(camera.lens);
+  const auto named = std::ranges::find(lens_names, given, &std::pair<std::string_view, std::string_view>::first);
+  if (named == lens_names.end()) return lens[0];
+  const std::vector<std::string> names = param_names(camera.lens);
+  return lens[std::ranges::find(names, named->second) - names.begin()];
 }
 
 }  // namespace
@@ -37,6 +57,7 @@ std::vector<Assumption> localize_assumed(const Localization& report) {
     const auto named = std::ranges::find(all_named, given.name, &Named::given);
     if (named == all_named.end()) continue;
     const bool is_scale = named->given == "scale of the target", is_clock = named->given == "clock";
+    const bool is_port = named->given.starts_with("port's") || named->given.starts_with("water's");
     if ((is_scale || is_clock) && !report.scale_known) continue;
     Assumption each;
     each.name = named->name;
@@ -49,6 +70,7 @@ std::vector<Assumption> localize_assumed(const Localization& report) {
     each.moved_by = given.moved_by * error;
     each.remedy = is_scale   ? "give --sigma-scale, or σ in --target: sigma_m of each point, sigma_square_m of a board"
                   : is_clock ? "take times at the centre of each exposure: no observation says when it was"
+                  : is_port  ? remedy_port
                              : remedy_camera;
     assumed.push_back(each);
   }

@@ -9,7 +9,8 @@ GivenEffects::GivenEffects(const Camera& camera, std::span<const int> estimated,
   const std::vector<std::string> names = param_names(camera.lens);
   const bool has_cov = camera.cov.size() > 0;
   for (int i = 0; i < static_cast<int>(names.size()); ++i) {
-    constexpr std::array<std::string_view, 5> tested{"fx", "fy", "cx", "cy", "k1"};
+    constexpr std::array<std::string_view, 9> tested{"fx",      "fy",    "cx",       "cy",      "k1",
+                                                     "n_water", "gap_m", "normal_x", "normal_y"};
     const bool is_tested = std::ranges::find(tested, names[static_cast<std::size_t>(i)]) != tested.end();
     if (!is_tested && !(has_cov && camera.cov(i, i) > 0.0)) continue;
     if (std::ranges::find(estimated, i) == estimated.end()) lens_params_.push_back(i);

@@ -25,7 +25,8 @@ class GivenEffects {
   using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
 
   GivenEffects() = default;
-  /// Of the lens: fx, fy, cx, cy, k1, and whatever has a covariance, except `estimated`.
+  /// Of the lens: fx, fy, cx, cy, k1, a port's water, gap and normal, and whatever has a covariance, except
+  /// `estimated`.
   GivenEffects(const Camera& camera, std::span<const int> estimated, double sigma_scale, int capacity,
                int observations);
 

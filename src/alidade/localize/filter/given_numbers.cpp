@@ -28,6 +28,24 @@ GivenNumber given_number(std::string_view name, const Eigen::VectorXd& direction
   return given;
 }
 
+/// A port that was not calibrated with its lens: what its observations say of it, the focal length says nearly alike,
+/// and is named.
+template <class Place, class Add>
+void add_port(const GivenSystem& system, const Place& place, const Add& add, std::vector<GivenNumber>& all) {
+  const Eigen::Index gap = place("gap_m");
+  if (gap < 0 || system.cov(gap, gap) > 0.0) return;
+  for (const auto& [param, name] :
+       {std::pair{"n_water", "water's index"}, std::pair{"gap_m", "port's gap"},
+        std::pair{"normal_x", "port's normal x"}, std::pair{"normal_y", "port's normal y"}}) {
+    const Eigen::Index at = place(param);
+    if (at < 0) continue;
+    const double variance = system.cov(at, at);
+    add(name, Eigen::VectorXd::Unit(system.score.size(), at),
+        variance > 0.0 ? std::optional(std::sqrt(variance)) : std::nullopt);
+    all.back().asked = all.back().z = 0.0;
+  }
+}
+
 }  // namespace
 
 void take_move(const Eigen::Vector<double, 6>& move, const Eigen::Matrix<double, 6, 6>& cov, GivenNumber& given) {
@@ -67,6 +85,7 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
     const Eigen::Index at = place(param);
     if (at >= 0) add(name, direction_of(at), has_cov ? std::optional(std::sqrt(system.cov(at, at))) : std::nullopt);
   }
+  add_port(system, place, add, all);
   add("scale of the target", direction_of(num), std::sqrt(system.cov(num, num)));
   all.back().asked = all.back().z = 0.0;  // all may be larger: no observation shows it
   const auto at_cause = [&](int cause) { return direction_of(num + cause); };

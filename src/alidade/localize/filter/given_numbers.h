@@ -20,7 +20,7 @@ struct GivenSystem {
 };
 
 /// Focal length (relative), centre (px), k1 (absolute, in a hundredth) and scale of the target (relative), as far as
-/// they are given and not estimated.
+/// they are given and not estimated; of a port that has no covariance, the water's index, the gap (m) and the normal.
 /// Then of a smoothed path: shape of the target (x longer and y shorter, relative), its speed (m/s), readout (s), and
 /// how fast the target rotates about its centre (rad/s).
 [[nodiscard]] std::vector<GivenNumber> given_numbers(const GivenSystem& system);

@@ -195,7 +195,10 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
     causes.other = other_object(observations, heads, config, report);
   if (causes.other) return causes;
   if (report.num_restarts > 1) causes.jumps = velocity_jumps(report.steps, config.tracker);
-  if (causes.jumps && fits(report)) return causes;
+  if (causes.jumps && fits(report)) {
+    if (config.tracker.method != TargetMotion::ballistic) causes.falls = falling_target(observations, heads, config);
+    return causes;
+  }
   if (is_explained && !fits(report)) return causes;
   const bool is_odd = !fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected;
   const bool is_jitter = report.jitter && fits(report);
@@ -338,13 +341,14 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   add_frozen(report, heads, verdict);
   if (causes.other) add_other(*causes.other, heads, verdict);
   if (causes.jumps) verdict.checks.push_back(velocity_jumps_check(*causes.jumps));
+  if (causes.jumps && causes.falls) verdict.checks.back().text += "; " + causes.falls->text;
   if (report.jitter && !causes.mistake && !causes.jumps)
     verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
                                    1e3 * report.jitter->sigma_s, 0.0, "ms"));
   add_clocks(report, causes, heads, verdict);
   if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
   if (causes.second) verdict.checks.push_back(*causes.second);
-  if (causes.falls) verdict.checks.push_back(*causes.falls);
+  if (causes.falls && !causes.jumps) verdict.checks.push_back(*causes.falls);
   add_checks(report, verdict);
   add_white(report, heads, verdict);
   put_likelier_first(verdict);

@@ -67,6 +67,29 @@ std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s) {
   return steps;
 }
 
+std::vector<PathStep> without_jitter(std::span<const PathStep> path, double half_s) {
+  constexpr std::size_t enough = 5;
+  std::vector<PathStep> steps(path.begin(), path.end());
+  std::size_t first = 0, last = 0;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    while (path[i].t_s - path[first].t_s > half_s) ++first;
+    while (last < path.size() && path[last].t_s - path[i].t_s <= half_s) ++last;
+    if (!path[i].has_pose() || last - first < enough) continue;
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero(), g = Eigen::Matrix3d::Zero();
+    std::size_t num = 0;
+    for (std::size_t k = first; k < last; ++k) {
+      if (!path[k].has_pose()) continue;
+      const double t = (path[k].t_s - path[i].t_s) / half_s;
+      const Eigen::Vector3d powers(1.0, t, t * t);
+      H += powers * powers.transpose();
+      g += powers * path[k].world_from_cam.translation.transpose();
+      ++num;
+    }
+    if (num >= enough) steps[i].world_from_cam.translation = (H.inverse() * g).row(0).transpose();
+  }
+  return steps;
+}
+
 namespace {
 
 constexpr double rejected_beyond = 4.0;  // of their robust σ

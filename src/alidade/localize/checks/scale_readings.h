@@ -45,6 +45,11 @@ struct ReadScale {
 /// its first value.
 [[nodiscard]] std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s);
 
+/// A path without what differs from frame to frame: positions by parabolas through those within `half_s`. A filter
+/// averages such errors of the path, and would seem to explain readings better for that alone.
+[[nodiscard]] std::vector<PathStep> without_jitter(std::span<const PathStep> path, double half_s);
+constexpr double jitter_s = 0.4;
+
 /// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of
 /// what is left over, whose neighbours in time are alike, and `sigma_rel`, which all share. Readings far from all
 /// others are rejected; a clock that is up to a second off, a filter, and a jump of the offset are found by the
@@ -60,11 +65,11 @@ struct ReadScale {
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 
-/// The straight ways between two positions, by odometry over by the path, of a twentieth of the whole way each: their
-/// mean, without those far from all others (wheels slip), with their scatter as σ, `sigma_rel`, which all share, and
-/// what is persistently left over, beyond the path's σ, of a similarity of each fifth of the way: slipping lengthens
-/// all ways, a plane in which the camera does not stay shortens them. A clock that is up to a second off, and a filter,
-/// are found by the same. None: too few readings, hardly a way, or readings that do not fit the path.
+/// The vehicle's steps against the path's (odometry_steps.h), without readings far from those around them, with σ of
+/// what is left over, `sigma_rel`, which all share, and what is persistently left over, beyond the path's σ, of a
+/// similarity of each fifth of the way: slipping lengthens all steps, a plane in which the camera does not stay
+/// shortens them. A clock that is up to a second off, and a filter, are found by the same. None: too few readings,
+/// hardly a way, or readings that do not fit the path.
 [[nodiscard]] std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> readings, double sigma_rel,
                                                          std::span<const PathStep> path);
 

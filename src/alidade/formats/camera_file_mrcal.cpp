@@ -94,7 +94,7 @@ class LiteralReader {
       }
     } else {
       if (first == 'b' && at_ + 1 < text_.size() && (text_[at_ + 1] == '\'' || text_[at_ + 1] == '"')) ++at_;  // bytes
-      if (text_[std::min(at_, text_.size() - 1)] == '\'' || text_[std::min(at_, text_.size() - 1)] == '"') {
+      if (at_ < text_.size() && (text_[at_] == '\'' || text_[at_] == '"')) {
         out.word = quoted();
       } else {
         while (at_ < text_.size() && text_.substr(at_, 1).find_first_of(" \t\r\n,:]})#([{") != 0)

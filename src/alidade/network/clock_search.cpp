@@ -117,6 +117,26 @@ std::optional<RelativePose> relative_pose(const ObservationSeries& first, const 
   return pose;
 }
 
+namespace {
+
+/// The pose with which the most points agree; none where a solver finds its points too near to each other.
+std::optional<Resection> agreeing_pose(const std::vector<cv::Point3d>& points, const std::vector<cv::Point2d>& seen,
+                                       double reach, cv::SolvePnPMethod solver) try {
+  cv::Mat turn, translation, agree;
+  if (!cv::solvePnPRansac(points, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, translation, false, 100,
+                          static_cast<float>(reach), 0.99, agree, solver))
+    return std::nullopt;
+  Eigen::Vector3d phi, t;
+  cv::cv2eigen(turn, phi);
+  cv::cv2eigen(translation, t);
+  return Resection{
+      {exp_so3(phi), t}, static_cast<double>(agree.rows) / static_cast<double>(points.size()), points.size()};
+} catch (const cv::Exception&) {
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<Resection> resection(const ObservationSeries& camera, std::span<const double> t_s,
                                    std::span<const Eigen::Vector3d> point_in_world, double offset_s, double rate) {
   std::vector<cv::Point3d> points;
@@ -129,16 +149,13 @@ std::optional<Resection> resection(const ObservationSeries& camera, std::span<co
     seen.emplace_back(at->x(), at->y());
   }
   if (points.size() < min_common) return std::nullopt;
-  cv::Mat turn, translation, agree;
   const double reach = std::max(2.0 * min_agree, 2.0 * agree_px / camera.px);
-  if (!cv::solvePnPRansac(points, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, translation, false, 100,
-                          static_cast<float>(reach), 0.99, agree, cv::SOLVEPNP_SQPNP))  // EPnP fails in a plane
-    return std::nullopt;
-  Eigen::Vector3d phi, t;
-  cv::cv2eigen(turn, phi);
-  cv::cv2eigen(translation, t);
-  return Resection{
-      {exp_so3(phi), t}, static_cast<double>(agree.rows) / static_cast<double>(points.size()), points.size()};
+  constexpr double most = 0.5;
+  const auto best = agreeing_pose(points, seen, reach, cv::SOLVEPNP_SQPNP);
+  if (best && best->share >= most) return best;
+  // It refuses points that are one, as of a target that rests; EPnP is wrong where they are in a plane.
+  const auto other = agreeing_pose(points, seen, reach, cv::SOLVEPNP_EPNP);
+  return other && !(best && best->share >= other->share) ? other : best;
 }
 
 }  // namespace alidade

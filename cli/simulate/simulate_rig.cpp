@@ -24,7 +24,7 @@ struct SimulateRigArgs {
   std::filesystem::path rig;
   int boards = 8, views = 4;
   double sigma_px = 0.2, sigma_angle_deg = 0.02, wrong = 0.0;
-  double scale = 1.0, once_deg = 0.0, twice_deg = 0.0, backlash_deg = 0.0;
+  double scale = 1.0, once_deg = 0.0, twice_deg = 0.0, backlash_deg = 0.0, moved_mm = 0.0;
   RigMistake mistake;
   bool photos = false;
 };
@@ -35,6 +35,7 @@ RigSceneConfig config_from(const SimulateRigArgs& args, Run& run) {
   config.max_views_of_a_board = args.views;
   config.encoder_scale = args.scale;
   config.once_rad = args.once_deg * degree;
+  config.sigma_moved_m = 1e-3 * args.moved_mm;
   for (RigHead& head : xiahou_rig()) config.nominal.push_back(head);
   if (!args.rig.empty()) {
     run.add_input("rig", args.rig);
@@ -143,6 +144,8 @@ void add_rig_scenario(App& app) {
              0.0, 15.0);
   add_number(command, "--twice-deg", args->twice_deg, "The same of two periods a turn [deg]", 0.0, 15.0);
   add_number(command, "--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
+  add_number(command, "--moved-mm", args->moved_mm,
+             "σ of each coordinate by which boards are moved between the heads' views [mm]", 0.0, 100.0);
   add_number(command, "--focal-error", args->mistake.focal,
              "Share by which the camera files' focal lengths are too long", -0.5, 0.5);
   add_number(command, "--centre-error", args->mistake.centre_px, "Error of their centres in u and v [px]", -1e3, 1e3);

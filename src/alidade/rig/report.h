@@ -51,6 +51,9 @@ struct HeadCover {
   int num_shared_boards = 0;  ///< Seen by another head, too.
 };
 
+/// Name of a cause: boards were moved between the views of one head and those of another.
+inline constexpr const char* moved_boards_name = "board positions";
+
 /// A parameter that the residuals indicate to be free: by how many σ, and its value (a score test).
 struct RigCause {
   std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn", "all scales", "head1.pan zero drift"
@@ -60,6 +63,10 @@ struct RigCause {
 
   /// Of a head's base, or of a zero, over the views as they were taken.
   [[nodiscard]] bool is_drift() const { return name.ends_with(" drift"); }
+  /// To compare by: what names one thing says more than what names many, where it explains nearly as much.
+  [[nodiscard]] double rank() const { return sigmas * (name.starts_with("all ") ? 0.8 : is_of_boards() ? 0.7 : 1.0); }
+  /// Of boards, between the views of one head and those of another.
+  [[nodiscard]] bool is_of_boards() const { return name == moved_boards_name; }
   /// Of a lens, beyond what its file says.
   [[nodiscard]] bool is_distortion() const { return name.ends_with("camera.k1"); }
   [[nodiscard]] bool is_of_lens() const { return name.find("camera.") != std::string::npos || name == "all centre"; }

@@ -153,8 +153,11 @@ class ByNeed {
     constexpr double near = 0.5;  // of the largest: what one cause does looks to another's score like itself
     std::vector<Candidate> candidates;
     if (best_.causes.empty()) return candidates;
-    const RigCause& first = *std::ranges::max_element(best_.causes, {}, &RigCause::sigmas);
-    const auto has_no_parameter = [](const RigCause& cause) { return cause.is_drift() || cause.is_distortion(); };
+    const RigCause& first = *std::ranges::max_element(
+        best_.causes, {}, [](const RigCause& cause) { return cause.is_of_boards() ? cause.rank() : cause.sigmas; });
+    const auto has_no_parameter = [](const RigCause& cause) {
+      return cause.is_drift() || cause.is_distortion() || cause.is_of_boards();
+    };
     // It is named, and nothing else absorbs it.
     if (has_no_parameter(first) && first.sigmas > rig_cause_limit) return candidates;
     const double largest = first.sigmas;

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "alidade/estimation/innovation.h"
-#include "alidade/geometry/decompositions.h"
-#include "alidade/rig/rig_clusters.h"
+#include "alidade/rig/checks/moved_boards.h"
+#include "alidade/rig/checks/rig_score.h"
 
 namespace alidade {
 namespace {
@@ -115,61 +114,6 @@ MatrixXd tested_columns(const RigProblem& problem, const RigState& state, std::s
   return D;
 }
 
-/// Score and information of all that is tested, everything else following.
-struct Score {
-  VectorXd s;
-  MatrixXd I;
-  MatrixXd by_lenses;  ///< Of it with the parameters of all heads' lenses.
-};
-
-Index num_lens_params(const RigState& state, std::size_t head) { return params(state.heads[head].camera.lens).size(); }
-
-Index first_lens_param(const RigState& state, std::size_t head) {
-  Index first = 0;
-  for (std::size_t h = 0; h < head; ++h) first += num_lens_params(state, h);
-  return first;
-}
-
-Score score_of(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
-               const std::vector<double>& weights) {
-  const auto num = tested_a_head * static_cast<Index>(solved.state.heads.size());
-  const Index num_lenses = first_lens_param(solved.state, solved.state.heads.size());
-  Score score{VectorXd::Zero(num), MatrixXd::Zero(num, num), MatrixXd::Zero(num, num_lenses)};
-  // Beside what is tested the lenses, to whose errors the score responds.
-  MatrixXd by_common = MatrixXd::Zero(cov.rows(), num + num_lenses);
-  std::vector<MatrixXd> by_board(solved.state.world_from_board.size(), MatrixXd::Zero(6, num + num_lenses));
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    if (!(weights[v] > 0.0)) continue;
-    const auto at = view_residuals(problem, solved.state, v);
-    const auto equations = view_equations(problem, solved, v);
-    if (!at || !equations) continue;
-    const MatrixXd D = tested_columns(problem, solved.state, v), lens = given_columns(problem, solved.state, v).lens;
-    const Index first = tested_a_head * static_cast<Index>(problem.views[v].head);
-    const MatrixXd by_correction = at->J_correction.transpose() * D;
-    const Eigen::Matrix2d E = at->J_correction.transpose() * at->J_correction;
-    score.s.segment(first, tested_a_head) += D.transpose() * at->r;
-    score.I.block(first, first, tested_a_head, tested_a_head) +=
-        D.transpose() * D - by_correction.transpose() * (E.inverse() * by_correction);
-    const Index first_lens = first_lens_param(solved.state, problem.views[v].head);
-    score.by_lenses.block(first, first_lens, tested_a_head, lens.cols()) +=
-        D.transpose() * lens - by_correction.transpose() * (E.inverse() * (at->J_correction.transpose() * lens));
-    const auto add_pose = [&](Index column, const MatrixXd& columns) {
-      const MatrixXd by_pose = equations->Q.transpose() * columns;
-      by_common.middleCols(column, columns.cols()) += equations->G.transpose() * by_pose;
-      by_board[problem.views[v].board].middleCols(column, columns.cols()) += equations->K_board.transpose() * by_pose;
-    };
-    add_pose(first, D);
-    add_pose(num + first_lens, lens);
-  }
-  MatrixXd followed = by_common.leftCols(num).transpose() * cov * by_common;
-  for (std::size_t b = 0; b < by_board.size(); ++b)
-    if (!solved.system.boards[b].V.isZero(0.0))
-      followed += by_board[b].leftCols(num).transpose() * Ldlt(solved.system.boards[b].V).solve_each(by_board[b]);
-  score.I -= followed.leftCols(num);
-  score.by_lenses -= followed.rightCols(num_lenses);
-  return score;
-}
-
 /// σ with which a scale was given; none: as if exact. What is given of lenses comes with the covariance of their files.
 double given_sigma(const std::vector<Assumption>& assumed, const std::string& name) {
   const auto what = std::ranges::find(assumed, name, &Assumption::name);
@@ -190,28 +134,20 @@ VectorXd given_sigmas(const std::vector<Assumption>& assumed, const Tested& test
 std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
                                  const std::vector<double>& weights, const std::vector<Assumption>& assumed,
                                  const MatrixXd& cov_lenses, double num_given) {
-  const Score score = score_of(problem, solved, cov, weights);
+  const auto num = tested_a_head * static_cast<Index>(solved.state.heads.size());
+  const RigScore score = rig_score(problem, solved, cov, weights, num, [&](std::size_t v) {
+    const Index first = tested_a_head * static_cast<Index>(problem.views[v].head);
+    return std::optional<TestedColumns>({first, tested_columns(problem, solved.state, v)});
+  });
   std::vector<RigCause> causes;
   for (const Tested& tested : tested_of(problem, solved.state)) {
-    const SymmetricEigen eigen = symmetric_eigen(MatrixXd(score.I(tested.places, tested.places)));
-    const Index num = (eigen.values.array() * tested.worst * tested.worst > 1.0).count();  // the last ones
-    if (num == 0) continue;
-    const MatrixXd V = eigen.vectors.rightCols(num);
-    const VectorXd variances = eigen.values.tail(num).cwiseInverse();
-    const VectorXd along = variances.cwiseProduct(V.transpose() * score.s(tested.places));
-    // By errors of the files, and of what itself was given.
-    const MatrixXd moved = variances.asDiagonal() * V.transpose() * score.by_lenses(tested.places, Eigen::all);
-    const MatrixXd given = V.transpose() * given_sigmas(assumed, tested).asDiagonal();
-    MatrixXd C = moved * cov_lenses * moved.transpose() + given * given.transpose();
-    C.diagonal() += variances;
-    const double chi2 = along.dot(solve_symmetric(C, along));
-    const VectorXd size = -V * along;
-    causes.push_back({tested.name, size.size() == 1 ? size[0] : size.norm(), tested.unit,
-                      score_sigmas(chi2, static_cast<double>(num), num_given)});
+    const auto asked = score.asked(tested.places, tested.worst, given_sigmas(assumed, tested), cov_lenses, num_given);
+    if (!asked) continue;
+    const double size = asked->size.size() == 1 ? asked->size[0] : asked->size.norm();
+    causes.push_back({tested.name, size, tested.unit, asked->sigmas});
   }
-  // What names one axis says more than what names all, where it explains nearly as much.
-  std::ranges::sort(causes, std::greater{},
-                    [](const RigCause& cause) { return cause.sigmas * (cause.name.starts_with("all ") ? 0.8 : 1.0); });
+  if (const auto moved = moved_boards(problem, solved, cov, weights, cov_lenses, num_given)) causes.push_back(*moved);
+  std::ranges::sort(causes, std::greater{}, &RigCause::rank);
   return causes;
 }
 

@@ -67,6 +67,8 @@ INSTANTIATE_TEST_SUITE_P(
         RigFault{"half_pan", [](RigTrialSetup& s) { s.mistake.pan_read = 0.5; }},
         RigFault{"double_pan", [](RigTrialSetup& s) { s.mistake.pan_read = 2.0; }},
         RigFault{"turned_corners", [](RigTrialSetup& s) { s.mistake.turn_corners = true; }},
+        RigFault{"moved_boards_little", [](RigTrialSetup& s) { s.scene.sigma_moved_m = 0.0005; }},
+        RigFault{"moved_boards", [](RigTrialSetup& s) { s.scene.sigma_moved_m = 0.002; }},
         RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
     [](const auto& info) { return std::string(info.param.name); });
 
@@ -118,6 +120,29 @@ TEST(RigByNeed, LeavesACleanRigAsItIs) {
       EXPECT_LT(std::abs(one.value - one.was), 4.5 * one.sigma) << one.name;
   }
   EXPECT_EQ(freed, 0);
+}
+
+TEST(RigByNeed, BoardsMovedBetweenTheHeadsViewsAreNamedAndNothingAbsorbsIt) {
+  const int draws = testing::trials(4);
+  int num_all = 0;
+  for (int draw = 1; draw <= draws; ++draw) {
+    RigTrialSetup setup;
+    setup.scene.num_boards = 8;
+    setup.scene.sigma_moved_m = draw % 2 == 0 ? 0.001 : 0.003;
+    const RigTrial trial = rig_trial(setup, static_cast<std::uint64_t>(draw));
+    const auto named = std::ranges::find(trial.verdict.checks, "causes", &Check::name);
+    const bool is_one_board = trial.verdict.sentence.find("moved between view") != std::string::npos;
+    if (is_one_board) continue;  // refused: one of them was moved most
+    ++num_all;
+    ASSERT_NE(named, trial.verdict.checks.end()) << draw << ": " << trial.verdict.sentence << trial.verdict.to_add;
+    EXPECT_EQ(named->state, State::care) << draw;
+    EXPECT_NE(named->text.find("boards were moved"), std::string::npos) << draw << ": " << named->text;
+    for (const RigFreed& one : trial.report.freed) EXPECT_LT(one.sigmas(), 4.0) << draw << ": " << one.name;
+    const auto cause = std::ranges::find_if(trial.report.causes, &RigCause::is_of_boards);
+    EXPECT_NEAR(cause->size, std::sqrt(3.0) * setup.scene.sigma_moved_m,
+                0.5 * std::sqrt(3.0) * setup.scene.sigma_moved_m);
+  }
+  EXPECT_GE(2 * num_all, draws);
 }
 
 /// Of what the table says of one head alone, or of a board that was moved, the verdict says which.

@@ -226,22 +226,29 @@ const RigCause& first_cause(const RigReport& report) {
   return *first;
 }
 
+std::string indicated_text(const RigCause& cause) {
+  const std::string by = ", by " + text_of(cause.size, 2) + (cause.unit.empty() ? "" : " " + cause.unit) + " (" +
+                         text_of(cause.sigmas, 2) + "σ)";
+  if (cause.is_drift())
+    return "the residuals indicate a " + cause.name + " from the first view to the last" + by +
+           ": a head that was moved (two show it against each other only), or a zero that creeps; take the views again";
+  if (cause.is_of_boards())
+    return "boards were moved between the views of one head and those of another, by about " +
+           text_of(1e3 * cause.size, 2) + " mm (" + text_of(cause.sigmas, 2) +
+           "σ): fasten the board, and take all heads' views of a position before the next";
+  return "the residuals indicate another " + cause.name + by;
+}
+
 /// Causes indicated by the residuals, beyond those that errors shared within views would give by chance.
 void add_causes(const RigReport& report, Verdict& verdict) {
   if (report.causes.empty()) return;
   constexpr double most = rig_cause_limit;
   const RigCause& first = first_cause(report);
   const bool is_quiet = first.sigmas < most;
-  const std::string by = ", by " + text_of(first.size, 2) + (first.unit.empty() ? "" : " " + first.unit) + " (" +
-                         text_of(first.sigmas, 2) + "σ)";
-  const std::string indicated = first.is_drift() ? "the residuals indicate a " + first.name +
-                                                       " from the first view to the last" + by +
-                                                       ": a head that was moved (two show it against each other only), "
-                                                       "or a zero that creeps; take the views again"
-                                                 : "the residuals indicate another " + first.name + by;
   verdict.checks.push_back(
       check_of("causes", is_quiet ? State::good : State::care,
-               is_quiet ? "other lenses, scales, eccentricities, backlash and drifts are not indicated" : indicated,
+               is_quiet ? "other lenses, scales, eccentricities, backlash, drifts and moved boards are not indicated"
+                        : indicated_text(first),
                first.sigmas, most, "σ"));
 }
 

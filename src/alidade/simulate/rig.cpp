@@ -129,7 +129,9 @@ RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
     bool is_seen = true;
     for (std::size_t h = 0; h < scene.rig.heads.size(); ++h) {
       if (!config.shared && static_cast<std::size_t>(index) % scene.rig.heads.size() != h) continue;
-      const std::vector<HeadView> own = views_of(scene.rig.heads[h], world_from_board, points, config);
+      Rigid3 now = world_from_board;
+      if (h > 0 && config.sigma_moved_m > 0.0) now.translation += config.sigma_moved_m * draws.normal3();
+      const std::vector<HeadView> own = views_of(scene.rig.heads[h], now, points, config);
       is_seen = is_seen && own.size() >= 2;
       views.insert(views.end(), own.begin(), own.end());
     }

@@ -35,6 +35,7 @@ struct RigSceneConfig {
   bool first_encoder_only = false;  ///< That scale is the first head's alone; the others' are 1.
   double once_rad = 0.0;            ///< Amplitude of an error of one period per turn of each axis, its phase drawn.
   bool shared = true;               ///< Each board is seen by all heads.
+  double sigma_moved_m = 0.0;       ///< Of each coordinate by which a board is moved before the other heads' views.
 };
 
 /// Draws heads and boards. Boards that some head does not see at two pairs of angles are drawn again. Same seed, same

@@ -56,7 +56,7 @@ inline constexpr const char* moved_boards_name = "board positions";
 
 /// A parameter that the residuals indicate to be free: by how many σ, and its value (a score test).
 struct RigCause {
-  std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn", "all scales", "head1.pan zero drift"
+  std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn", "head1.pan zero drift", moved_boards_name
   double size = 0.0;
   std::string unit;
   double sigmas = 0.0;

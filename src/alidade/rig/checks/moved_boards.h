@@ -11,8 +11,8 @@ namespace alidade {
 
 /// Did boards move between the views of one head and those of another (taken one head after the other)? A score test of
 /// a displacement of each shared board in the views of each head but the first that sees it, all together; what boards
-/// have in common is the heads' own pose. None without shared boards. Of many boards sixty are tested. Arguments as of
-/// rig_causes().
+/// have in common is the heads' own pose. Its size: root mean square of the displacements beyond their noise [m]. None
+/// without shared boards. Of many boards a hundred displacements are tested. Arguments as of rig_causes().
 [[nodiscard]] std::optional<RigCause> moved_boards(const RigProblem& problem, const SolvedRig& solved,
                                                    const Eigen::MatrixXd& cov, std::span<const double> weights,
                                                    const Eigen::MatrixXd& cov_lenses, double num_given);

@@ -1,5 +1,7 @@
 #include "alidade/rig/checks/rig_score.h"
 
+#include <utility>
+
 #include "alidade/estimation/innovation.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/rig/rig_clusters.h"

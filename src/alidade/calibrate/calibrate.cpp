@@ -221,11 +221,13 @@ void refuse_few(const CalibrationWork& work, std::size_t least, CalibrateReport&
            "number the corners row by row, from the left, as --board counts them");
     return;
   }
-  const bool repeated = std::any_of(report.views.begin(), report.views.end(),
-                                    [](const ViewFit& view) { return view.reason.starts_with("is the same image"); });
+  const auto any = [&](auto&& is) { return std::ranges::any_of(report.views, is, &ViewFit::reason); };
+  const bool same = any([](const std::string& reason) { return reason.starts_with("is the same image"); });
+  const bool repeated = any([](const std::string& reason) { return reason.ends_with("with the same errors"); });
+  const char* const others = same ? " (others are the same image)" : repeated ? " (others repeat them)" : "";
   refuse(report,
          "only " + std::to_string(work.views.size()) + " usable photo" + (work.views.size() == 1 ? "" : "s") +
-             " of the board" + (repeated ? " (others are the same image)" : "") + "; it takes " + std::to_string(least),
+             " of the board" + others + "; it takes " + std::to_string(least),
          "add photos of the board, tilted 20–45° in several directions");
 }
 
@@ -237,12 +239,32 @@ bool boards_are_parallel(const CalibrationWork& work, const Lens& held, std::spa
   return !lens_is_known && spread_of_normals_rad(cam_from_board) < parallel_rad;
 }
 
+/// Of photos that show the board at one place with the same errors the first is kept; the others are named.
+bool drop_repeats(const BundleState& solved, CalibrateReport& report, CalibrationWork& work, BundleState& state) {
+  std::vector<std::vector<Eigen::Vector2d>> residuals;
+  for (std::size_t k = 0; k < work.views.size(); ++k) residuals.push_back(residuals_px(solved, k, work.arrays[k]));
+  const auto repeats = views_with_shared_errors(work.views, residuals);
+  state = solved;
+  bool dropped = false;
+  for (std::size_t k = repeats.size(); k-- > 0;) {
+    if (!repeats[k]) continue;
+    drop_view(k, "shows the board where " + work.views[*repeats[k]].photo + " does, with the same errors", report, work,
+              state);
+    dropped = true;
+  }
+  return dropped;
+}
+
 /// From an initial guess on.
 void solve_all(const CalibrateConfig& config, ImageSize size, BundleState state, CalibrationWork& work,
                CalibrateReport& report) {
   make_all_arrays(config, work);
   NoiseEstimate noise;
   Minima minima = solve_robustly(config, size, std::move(state), report, work, noise);
+  if (minima.settled && drop_repeats(minima.least.state, report, work, state)) {
+    make_all_arrays(config, work);
+    minima = solve_robustly(config, size, std::move(state), report, work, noise);
+  }
   fill_estimate(work, minima, noise, size, report);
   fill_views(work, minima.least, noise, report);
   report.camera.rms_px = report.rms_px;

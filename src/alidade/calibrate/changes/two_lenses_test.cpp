@@ -50,7 +50,9 @@ TEST(TwoLenses, AreNamedWithTheirPhotos) {
       ASSERT_TRUE(is_named(result)) << longer << ": " << result.verdict.sentence;
       EXPECT_EQ(result.verdict.state, State::bad);
       EXPECT_EQ(result.verdict.exit_code, ExitCode::not_trusted);
-      EXPECT_THAT(result.verdict.sentence, HasSubstr("8 of 24 (" + result.board_views[1].photo));
+      EXPECT_THAT(result.verdict.sentence,
+                  HasSubstr("8 of " + std::to_string(result.counts.used) + " (" + result.board_views[1].photo));
+      EXPECT_GE(result.counts.used, 22u);
       EXPECT_THAT(result.verdict.to_add, HasSubstr("calibrate the two apart"));
     }
   }
@@ -61,7 +63,9 @@ TEST(TwoLenses, EachIsThatOfItsViews) {
       0.1, [](std::size_t k) { return k < 9; }, 3);
   const CalibrateReport report = calibrate(testing::sample_board, views, testing::sample_size, {});
   const std::vector<ViewScore> scores = view_scores(testing::sample_board, {}, views, report);
-  const auto found = two_lenses(testing::sample_board, views, scores, {}, report);
+  const auto used = used_views(views, report, views.size());
+  ASSERT_GE(used.size(), 22u);  // planned photos at one place share what the wrong lens does there
+  const auto found = two_lenses(testing::sample_board, used, scores, {}, report);
   ASSERT_TRUE(found);
   EXPECT_THAT(found->seconds, ::testing::ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8));
   const double fx = params(sample_camera("brown").lens)[0];

@@ -140,7 +140,9 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
   else
     save_numbered(result);
   add_path_error(result);
-  result.missing = missing_frames(result.path);
+  auto missing = missing_frames(result.path);
+  result.missing = std::move(missing.frames);
+  result.frame_pattern = std::move(missing.pattern);
   result.counts = {result.path.size(), result.path.size() - result.num_lost, result.num_lost, {}};
   result.assumed = localize_assumed(result);
   result.verdict = localize_verdict(result);

@@ -148,6 +148,7 @@ struct Localization {
   std::size_t num_lost = 0;            ///< Frames whose pose observations do not constrain: waiting or predicted.
   std::size_t num_repeated = 0;        ///< Of these, those that showed the last one again while the camera moved.
   std::vector<MissingFrames> missing;  ///< Times that are numbered through them are wrong.
+  std::vector<int> frame_pattern;      ///< Periods from frame to frame, again and again, where `missing` has a pattern.
   std::size_t num_restarts = 0;
   std::size_t num_left = 0;                           ///< Times that a point was removed from a full filter.
   std::size_t num_loops = 0, num_loops_rejected = 0;  ///< Loop closures; of these rejected.

@@ -7,11 +7,23 @@
 #include <string>
 
 #include "alidade/estimation/median.h"
+#include "alidade/localize/checks/frame_pattern.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t wide = 16, narrow = 5, least_aside = 3;  ///< Frames on each side of a step.
+/// Of poses around a step: how many, and of which order a polynomial of time they are.
+struct Reach {
+  std::size_t aside = 0;  ///< Frames on each side.
+  Eigen::Index frames_a_power = 6;
+  bool has_bend = false;  ///< At the step its second and third derivative may jump, as where a camera sets off.
+  [[nodiscard]] Eigen::Index order(Eigen::Index num_frames) const {
+    return std::max<Eigen::Index>(1, (num_frames + 3) / frames_a_power);
+  }
+};
+/// Of many a walk is none; of few no wave of it is whole.
+constexpr Reach few{5, 6, false}, some{8, 4, true}, many{16, 6, true};
+constexpr std::size_t least_aside = 3;
 constexpr int most_missing = 30;
 
 /// A longer step, and twice the gain of log likelihood by it.
@@ -32,9 +44,10 @@ class PathTimes {
     best_.resize(steps_.size());
   }
 
-  [[nodiscard]] std::vector<MissingFrames> found() {
-    if (!has_period()) return {};
-    suppose_every();
+  void find() {
+    if (!has_period()) return;
+    suppose_pattern();
+    const std::vector<int> by_pattern = missing_;
     look_again(0, steps_.size());
     const std::size_t most_changes = steps_.size();
     for (std::size_t i = 0; i < most_changes; ++i) {
@@ -42,22 +55,25 @@ class PathTimes {
       if (!(best->gain > sure)) break;
       const auto k = static_cast<std::size_t>(best - best_.begin());
       missing_[k] = best->num;
-      look_again(k - std::min(k, 2 * wide), std::min(steps_.size(), k + 2 * wide));
+      look_again(k - std::min(k, 2 * many.aside), std::min(steps_.size(), k + 2 * many.aside));
     }
-    if (!is_smooth()) return {};
+    if (!is_smooth()) missing_ = by_pattern;
+  }
+  [[nodiscard]] std::vector<MissingFrames> found() const {
     std::vector<MissingFrames> all;
     for (std::size_t k = 1; k < steps_.size(); ++k)
       if (missing_[k] != 0) all.push_back({index_[k], missing_[k]});
     return all;
   }
+  [[nodiscard]] const std::vector<int>& pattern() const { return pattern_; }
 
  private:
   static constexpr double nothing = 1e-24;  ///< Variance of a path without errors.
-  static constexpr double sure = 60.0;      ///< Of twice a log likelihood: the path's errors last for some frames.
+  static constexpr double sure = 45.0;      ///< Of twice a log likelihood: the path's errors last for some frames.
 
   /// Where frames come by any clock of their own, their times say themselves what is missing.
   [[nodiscard]] bool has_period() {
-    if (steps_.size() < 2 * narrow) return false;
+    if (steps_.size() < 2 * few.aside) return false;
     std::vector<double> gaps_s;
     for (std::size_t k = 1; k < steps_.size(); ++k) gaps_s.push_back(steps_[k]->t_s - steps_[k - 1]->t_s);
     period_s_ = median_of(gaps_s);
@@ -69,24 +85,14 @@ class PathTimes {
     return static_cast<std::size_t>(20 * num_even) >= 19 * gaps_s.size();
   }
 
-  /// One of every few frames missing: around each of them others are, and none explains much alone.
-  void suppose_every() {
-    const std::vector<int> none(steps_.size(), 0);
-    double best = sure;
-    constexpr std::size_t rarest = 8;
-    for (std::size_t every = 2; every <= rarest; ++every)
-      for (std::size_t first = 1; first <= every; ++first) {
-        std::vector<int> missing = none;
-        for (std::size_t k = first; k < missing.size(); k += every) missing[k] = 1;
-        double gain = 0.0;
-        for (std::size_t from = 0; from + 2 * narrow <= steps_.size(); from += 2 * wide) {
-          const Window window(*this, from, std::min(steps_.size(), from + 2 * wide));
-          gain += window.gain(times_of(window, none), times_of(window, missing));
-        }
-        if (!(gain > best)) continue;
-        best = gain;
-        missing_ = std::move(missing);
-      }
+  /// Of every few frames one or some missing: around each of them others are, and none explains much alone.
+  void suppose_pattern() {
+    std::vector<NumberedPose> poses;
+    for (std::size_t i = 0; i < steps_.size(); ++i)
+      poses.push_back({index_[i], steps_[i]->t_s / period_s_, steps_[i]->world_from_cam});
+    pattern_ = frame_pattern(poses);
+    if (pattern_.empty()) return;
+    for (std::size_t i = 1; i < steps_.size(); ++i) missing_[i] = pattern_[(index_[i] - 1) % pattern_.size()] - 1;
   }
 
   /// Whether poses are polynomials of the times that were found, as far as what is new from frame to frame lets them
@@ -107,9 +113,9 @@ class PathTimes {
   /// Variance about the polynomials over the noise, of most components in most places.
   [[nodiscard]] double roughness(const std::vector<int>& missing, const Eigen::Array<double, 6, 1>& noise) const {
     std::vector<double> ratios;
-    for (std::size_t from = 0; from + 2 * narrow <= steps_.size(); from += wide / 2) {
-      const Window window(*this, from, std::min(steps_.size(), from + 2 * wide));
-      ratios.push_back((window.variance(times_of(window, missing)) / noise).log().mean());
+    for (std::size_t from = 0; from + 2 * few.aside <= steps_.size(); from += some.aside) {
+      const Window window(*this, from, std::min(steps_.size(), from + 2 * some.aside));
+      ratios.push_back((window.variance(times_of(window, missing), some) / noise).log().mean());
     }
     return std::exp(median_of(std::move(ratios)));
   }
@@ -127,8 +133,8 @@ class PathTimes {
     for (std::size_t k = std::max<std::size_t>(from, 1); k < to; ++k) best_[k] = best_at(k);
   }
 
-  /// Of the step to frame k, as its neighbours are now. Both few frames and many have to speak for it: of few it
-  /// explains only the error of one of them, of many only an acceleration.
+  /// Of the step to frame k, as its neighbours are now. Few frames and some have to speak for it: of few it explains
+  /// only the error of one of them, of some only an acceleration.
   [[nodiscard]] LongerStep best_at(std::size_t k) const {
     LongerStep best;
     const auto try_all = [&](std::initializer_list<int> nums) {
@@ -143,18 +149,18 @@ class PathTimes {
 
   [[nodiscard]] double gain_of(std::size_t k, int num) const {
     if (num == missing_[k]) return 0.0;
-    const double of_few = gain_within(k, num, narrow), of_many = gain_within(k, num, wide);
-    return std::min(of_few, of_many) > 0.0 ? std::max(of_few, of_many) : 0.0;
+    const double of_few = gain_within(k, num, few), of_some = gain_within(k, num, some);
+    return std::min(of_few, of_some) > 0.0 ? std::max({of_few, of_some, gain_within(k, num, many)}) : 0.0;
   }
 
-  [[nodiscard]] double gain_within(std::size_t k, int num, std::size_t aside) const {
-    const std::size_t first = k - std::min(k, aside), last = std::min(steps_.size(), k + aside);
+  [[nodiscard]] double gain_within(std::size_t k, int num, const Reach& reach) const {
+    const std::size_t first = k - std::min(k, reach.aside), last = std::min(steps_.size(), k + reach.aside);
     if (k - first < least_aside || last - k < least_aside) return 0.0;
     const Window window(*this, first, last);
     const Eigen::VectorXd times = times_of(window, missing_);
     Eigen::VectorXd longer = times;
     longer.tail(static_cast<Eigen::Index>(last - k)).array() += num - missing_[k];
-    return window.gain(times, longer);
+    return window.gain(times, longer, reach, static_cast<Eigen::Index>(k - first) - 1);
   }
 
   /// Poses of some frames in a row, from the middle one.
@@ -169,11 +175,15 @@ class PathTimes {
             log_so3(from_middle.rotation).transpose();
       }
     }
-    [[nodiscard]] double gain(const Eigen::VectorXd& times, const Eigen::VectorXd& others) const {
-      return static_cast<double>(poses_.rows() - order() - 1) * (left(times) / left(others)).log().sum();
+    /// Of the step after a frame.
+    [[nodiscard]] double gain(const Eigen::VectorXd& times, const Eigen::VectorXd& others, const Reach& reach,
+                              Eigen::Index after) const {
+      const Eigen::MatrixXd one = terms(times, reach, after), other = terms(others, reach, after);
+      return static_cast<double>(poses_.rows() - one.cols()) * (left(one) / left(other)).log().sum();
     }
-    [[nodiscard]] Eigen::Array<double, 6, 1> variance(const Eigen::VectorXd& times) const {
-      return left(times) / static_cast<double>(poses_.rows() - order() - 1);
+    [[nodiscard]] Eigen::Array<double, 6, 1> variance(const Eigen::VectorXd& times, const Reach& reach) const {
+      const Eigen::MatrixXd polynomial = terms(times, {reach.aside, reach.frames_a_power}, 0);
+      return left(polynomial) / static_cast<double>(poses_.rows() - polynomial.cols());
     }
     [[nodiscard]] double third_difference(Eigen::Index c) const {
       return poses_(3, c) - 3.0 * poses_(2, c) + 3.0 * poses_(1, c) - poses_(0, c);
@@ -181,19 +191,25 @@ class PathTimes {
     std::size_t first, last;
 
    private:
-    [[nodiscard]] Eigen::Index order() const { return std::max<Eigen::Index>(1, (poses_.rows() + 3) / 6); }
-    /// Sums of squares of each component about its best polynomial of time.
-    [[nodiscard]] Eigen::Array<double, 6, 1> left(const Eigen::VectorXd& times) const {
-      const Eigen::Index num = times.size();
-      const double middle = 0.5 * (times[0] + times[num - 1]);
-      Eigen::MatrixXd powers(num, order() + 1);
-      powers.col(0).setOnes();
-      for (Eigen::Index i = 1; i <= order(); ++i)
-        powers.col(i) = powers.col(i - 1).array() * (times.array() - middle) / (times[num - 1] - middle);
-      const Eigen::HouseholderQR<Eigen::MatrixXd> qr(powers);
+    /// Powers of time, and where there is a bend those of the time after it.
+    [[nodiscard]] static Eigen::MatrixXd terms(const Eigen::VectorXd& times, const Reach& reach, Eigen::Index bend) {
+      const Eigen::Index num = times.size(), order = reach.order(num);
+      const double middle = 0.5 * (times[0] + times[num - 1]), half = times[num - 1] - middle;
+      Eigen::MatrixXd all = Eigen::MatrixXd::Ones(num, order + (reach.has_bend ? 3 : 1));
+      for (Eigen::Index i = 1; i <= order; ++i) all.col(i) = all.col(i - 1).array() * (times.array() - middle) / half;
+      if (reach.has_bend) {
+        const Eigen::ArrayXd after = ((times.array() - times[bend]) / half).max(0.0);
+        all.col(order + 1) = after.square();
+        all.col(order + 2) = after.cube();
+      }
+      return all;
+    }
+    /// Sums of squares of each component about its best combination of terms.
+    [[nodiscard]] Eigen::Array<double, 6, 1> left(const Eigen::MatrixXd& terms) const {
+      const Eigen::HouseholderQR<Eigen::MatrixXd> qr(terms);
       Eigen::Matrix<double, Eigen::Dynamic, 6> turned = poses_;
       turned.applyOnTheLeft(qr.householderQ().adjoint());
-      return turned.bottomRows(num - order() - 1).colwise().squaredNorm().transpose().array() + nothing;
+      return turned.bottomRows(poses_.rows() - terms.cols()).colwise().squaredNorm().transpose().array() + nothing;
     }
     Eigen::Matrix<double, Eigen::Dynamic, 6> poses_;
   };
@@ -213,33 +229,47 @@ class PathTimes {
   std::vector<const PathStep*> steps_;  ///< With a pose by their own observations,
   std::vector<std::size_t> index_;      ///< and which of the path they are.
   std::vector<int> missing_;            ///< Before each.
+  std::vector<int> pattern_;            ///< Steps in periods, again and again; empty: none.
   std::vector<LongerStep> best_;
   double period_s_ = 0.0;
 };
 
+/// Before which frames how many, of the first few.
+std::string places_text(const Localization& report) {
+  constexpr std::size_t most_named = 3;
+  std::string where;
+  for (std::size_t i = 0; i < std::min(most_named, report.missing.size()); ++i)
+    where += (i == 0 ? " before frame " : ", ") + std::to_string(report.path[report.missing[i].before].frame) + " (" +
+             std::to_string(report.missing[i].num) + ")";
+  return report.missing.size() > most_named ? where + " …" : where;
+}
+
+std::string pattern_text(std::span<const int> pattern) {
+  std::string steps;
+  for (const int step : pattern) steps += (steps.empty() ? "" : ", ") + std::to_string(step);
+  return " in a regular pattern: frames are " + steps + " periods apart, again and again;";
+}
+
 }  // namespace
 
-std::vector<MissingFrames> missing_frames(std::span<const PathStep> path) { return PathTimes(path).found(); }
+FoundMissing missing_frames(std::span<const PathStep> path) {
+  PathTimes times(path);
+  times.find();
+  return {times.found(), times.pattern()};
+}
 
 void add_missing(const Localization& report, Verdict& verdict) {
   if (report.missing.empty()) return;
-  constexpr std::size_t most_named = 3;
   int num = 0;
-  std::string where;
-  for (std::size_t i = 0; i < report.missing.size(); ++i) {
-    const MissingFrames& each = report.missing[i];
-    num += each.num;
-    if (i < most_named)
-      where += (i == 0 ? " before frame " : ", ") + std::to_string(report.path[each.before].frame) + " (" +
-               std::to_string(each.num) + ")";
-  }
-  if (report.missing.size() > most_named) where += " …";
-  verdict.checks.push_back({"missing frames", State::care,
-                            std::to_string(num) + (num == 1 ? " frame seems" : " frames seem") +
-                                " to be missing:" + where +
-                                " the camera comes as far at once as in several periods, and times say nothing of it: "
-                                "those behind are too early",
-                            static_cast<double>(num), 0.0, "1", "path"});
+  for (const MissingFrames& each : report.missing) num += each.num;
+  const bool is_pattern = !report.frame_pattern.empty();
+  verdict.checks.push_back(
+      {"missing frames", State::care,
+       std::to_string(num) + (num == 1 ? " frame seems" : " frames seem") + " to be missing" +
+           (is_pattern ? pattern_text(report.frame_pattern) : ":" + places_text(report)) +
+           " the camera comes as far at once as in several periods, and times say nothing of it: " +
+           (is_pattern ? "they are not those of the frames" : "those behind are too early"),
+       static_cast<double>(num), 0.0, "1", "path"});
   verdict.to_add = "number the frames as they were taken, with the missing ones counted, or give each its time";
 }
 

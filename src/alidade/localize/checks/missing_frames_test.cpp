@@ -65,9 +65,25 @@ Recorded recorded(const Sway& sway, const std::set<int>& missing, std::uint64_t 
   return run;
 }
 
+/// It stands, and goes half a metre aside within a second, as fast as a hand does.
+Recorded setting_off(std::uint64_t seed) {
+  Sway still(seed);
+  still.amplitude.setZero();
+  Recorded run = recorded(still, {}, seed);
+  Draws draws(seed);
+  const double from_s = draws.uniform(1.0, 3.0), for_s = draws.uniform(0.5, 1.0);
+  for (PathStep& step : run.path) {
+    const double u = std::clamp((step.t_s - from_s) / for_s, 0.0, 1.0);
+    const double share = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    step.world_from_cam.translation += share * Eigen::Vector3d(0.3, -0.1, 0.2);
+    step.world_from_cam.rotation = step.world_from_cam.rotation * exp_so3(share * Eigen::Vector3d(0.1, 0.1, 0.0));
+  }
+  return run;
+}
+
 std::vector<std::size_t> found_at(const Recorded& run) {
   std::vector<std::size_t> all;
-  for (const MissingFrames& each : missing_frames(run.path)) all.push_back(each.before);
+  for (const MissingFrames& each : missing_frames(run.path).frames) all.push_back(each.before);
   return all;
 }
 
@@ -76,7 +92,7 @@ TEST(MissingFrames, OneAndSeveralAreFoundWhereTheyAre) {
     EXPECT_EQ(found_at(recorded(Sway(seed), {60}, seed)), (std::vector<std::size_t>{60})) << seed;
     const Recorded run = recorded(Sway(seed), {30, 31, 32, 70, 110, 111, 112, 113, 114}, seed);
     EXPECT_EQ(found_at(run), run.behind) << seed;
-    const std::vector<MissingFrames> missing = missing_frames(run.path);
+    const std::vector<MissingFrames> missing = missing_frames(run.path).frames;
     constexpr std::array num{3, 1, 5};
     for (std::size_t i = 0; i < std::min<std::size_t>(missing.size(), 3); ++i)
       EXPECT_NEAR(missing[i].num, num[i], 1) << seed;
@@ -93,15 +109,53 @@ TEST(MissingFrames, EveryFifthIsFound) {
   }
 }
 
+/// Frames that are missing where these steps come again and again.
+std::set<int> missing_by(const std::vector<int>& pattern) {
+  std::set<int> missing;
+  for (int k = 0, at = 0; k < 300; ++k) {
+    const int step = pattern[static_cast<std::size_t>(k) % pattern.size()];
+    for (int i = 1; i < step; ++i) missing.insert(at + i);
+    at += step;
+  }
+  return missing;
+}
+
+/// Between any two steps the camera goes as far in one way as in the other: also a shaken one's, of which hardly any
+/// polynomial is.
+TEST(MissingFrames, APatternIsFoundWhateverTheMotion) {
+  int num_found = 0;
+  for (const std::vector<int>& pattern : {std::vector{1, 2}, std::vector{1, 3}, std::vector{1, 1, 2}})
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      EXPECT_EQ(missing_frames(recorded(Sway(seed), missing_by(pattern), seed).path).pattern, pattern) << seed;
+      const Recorded shaken = recorded(Sway(seed, 0.01), missing_by(pattern), seed);
+      num_found += !missing_frames(shaken.path).pattern.empty();
+    }
+  EXPECT_GE(num_found, 12) << num_found;
+}
+
+/// Of whoever walks no polynomial is of a second; and none of one who sets off.
+TEST(MissingFrames, SeveralAreFoundOfWhoeverWalks) {
+  int num_found = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const std::vector<std::size_t> found = found_at(recorded(Sway(seed, 0.01), {60, 61, 62, 63, 64}, seed));
+    num_found += found == std::vector<std::size_t>{60};
+    EXPECT_LE(found.size(), 1u) << seed;
+  }
+  EXPECT_GE(num_found, 5) << num_found;
+}
+
 /// A camera that sways, shakes, or stands; and one whose frames bear the times at which they were taken.
 TEST(MissingFrames, NoneWhereNoneIsMissing) {
   const auto num_seeds = static_cast<std::uint64_t>(testing::trials(40));
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     EXPECT_TRUE(found_at(recorded(Sway(seed), {}, seed)).empty()) << seed;
     EXPECT_TRUE(found_at(recorded(Sway(seed, 0.015), {}, seed)).empty()) << seed;
+    EXPECT_TRUE(found_at(setting_off(seed)).empty()) << seed;
     Sway still(seed);
     still.amplitude.setZero();
     EXPECT_TRUE(found_at(recorded(still, {60}, seed)).empty()) << seed;
+    for (const Sway& sway : {Sway(seed), Sway(seed, 0.015), still})
+      EXPECT_TRUE(missing_frames(recorded(sway, {}, seed).path).pattern.empty()) << seed;
     Recorded timed = recorded(Sway(seed), {60, 61}, seed);
     for (std::size_t k = 60; k < timed.path.size(); ++k) timed.path[k].t_s += 2.0 / 30.0;
     EXPECT_TRUE(found_at(timed).empty()) << seed;

@@ -1,6 +1,7 @@
 #include "alidade/rig.h"
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "alidade/board_detector/board_guess.h"
 #include "alidade/board_detector/find_boards.h"
 #include "alidade/camera/camera_fault.h"
+#include "alidade/rig/checks/repeated_stops.h"
 #include "alidade/rig/rig.h"
 
 namespace alidade {
@@ -98,6 +100,15 @@ std::optional<WrongBoard> find_board_corners(RigCalibration& result, const std::
   return wrong;
 }
 
+/// The views of one stop as one. Returns σ of a reading within a stop [rad].
+double average_stops(RigCalibration& result) {
+  AveragedStops stops = averaged_stops(result.measured);
+  result.measured = std::move(stops.views);
+  result.repeated = std::move(stops.repeated);
+  result.counts.skipped.insert(result.counts.skipped.end(), result.repeated.begin(), result.repeated.end());
+  return stops.sigma_within_rad;
+}
+
 }  // namespace
 
 RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cameras, const RigConfig& config,
@@ -109,6 +120,7 @@ RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cam
   result.measured = std::move(views);
   std::optional<WrongBoard> wrong;
   if (load_photo) wrong = find_board_corners(result, cameras, load_photo, progress);
+  const double sigma_within_rad = average_stops(result);
   const auto calibrated = config.estimate_by_need ? calibrate_rig_by_need : calibrate_rig;
   static_cast<RigReport&>(result) =
       calibrated(result.measured, points_in_board(*config.board), cameras, config, progress);
@@ -118,8 +130,12 @@ RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cam
     result.verdict.to_add = wrong->to_add;
   }
   result.counts.used = static_cast<std::size_t>(result.views_used);
-  result.counts.dropped = static_cast<std::size_t>(result.views_dropped);
+  result.counts.dropped = static_cast<std::size_t>(result.views_dropped) + result.repeated.size();
   if (result.status != RigReport::Status::converged) return result;
+  for (RigHead& one : result.rig.heads) {
+    double& sigma_rad = one.head.encoder.sigma_rad;  // of one reading: that of a stop's mean, and what is within it
+    if (result.sigma_encoder_is_estimated) sigma_rad = std::hypot(sigma_rad, sigma_within_rad);
+  }
   result.covariance = result.rig.cov;
   result.parameter_names = parameter_names(result.rig);
   return result;

@@ -243,6 +243,9 @@ std::vector<std::string> lines_of(const RigCalibration& result) {
     if (!fit.used && !fit.reason.empty())
       lines.push_back(fmt::format("not used: {}: {}", result.measured[v].seen.photo, fit.reason));
   }
+  if (!result.repeated.empty())
+    lines.push_back(fmt::format("averaged: {} of {} views show their board where the view before does",
+                                result.repeated.size(), result.counts.given));
   if (result.status != RigReport::Status::converged) return lines;
   for (std::size_t h = 0; h < result.rig.heads.size(); ++h) add_lines_of_head(result.rig, h, lines);
   for (const RigFreed& one : result.freed)

@@ -199,6 +199,8 @@ void read_values(LocalizeArgs& args) {
   if (!args.map.empty()) args.config.map = read_map(args.map);
   if (!args.start.empty()) args.config.start = read_start(args.start);
   if (args.range.empty() != args.beam.empty()) throw UsageError("--range and --beam belong together: give both");
+  if (args.depth_sensor.empty() && (args.config.depth_arm_m || args.config.sigma_depth_arm_m))
+    throw UsageError("--depth-arm and --sigma-depth-arm need --depth-sensor");
   if (!args.depth_sensor.empty())
     args.config.depth_readings = read_depth_sensor(args.depth_sensor, args.skip_bad, &args.skipped);
   if (!args.odometry.empty())

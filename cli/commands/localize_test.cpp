@@ -221,6 +221,7 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
 TEST_F(LocalizeCommand, ASensorsFileIsReadByTheSameRulesAndOutOfTimeIsNamed) {
   simulate();
   const std::string header = "t_s,depth_m\n";
+  EXPECT_EQ(localize(given({"--depth-arm", "0,0,1"})).code, 2);
   write_file(path("depth.csv"), header + "0,1\nnan,1\n0.2,1\n0.1,1\n0.3,1\n");
   const Outcome stopped = localize(given({"--depth-sensor", path("depth.csv")}));
   EXPECT_EQ(stopped.code, 3);

@@ -53,6 +53,20 @@ FieldList sigma_fields(LocalizeConfig& config) {
            "σ of the scale of --depth-sensor, relative: the density of the water, fresh or sea, and the sensor's own "
            "(0.01: 1 %)",
        .limits = positive},
+      {.name = "depth_arm_m",
+       .value = numbers_code(
+           3,
+           [&config] {
+             const auto& arm = config.depth_arm_m;
+             return arm ? std::vector<double>{arm->x(), arm->y(), arm->z()} : std::vector<double>{};
+           },
+           [&config](const std::vector<double>& arm) { config.depth_arm_m = Eigen::Vector3d(arm[0], arm[1], arm[2]); }),
+       .help = "Where the sensor of --depth-sensor is, x,y,z in the camera's frame [m] (default: at its centre)",
+       .form = "NUMBER"},
+      {.name = "sigma_depth_arm_m",
+       .value = &config.sigma_depth_arm_m,
+       .help = "σ of each coordinate of that place [m]: it is estimated with the scale",
+       .limits = positive},
       {.name = "sigma_odometry",
        .value = &config.sigma_odometry,
        .help = "σ of the scale of --odometry, relative, as of a wheel's radius (0.01: 1 %)",

@@ -134,6 +134,9 @@ struct LocalizeConfig {
   LocalizeTarget target = {};
   std::optional<SavedMap> map = {};  ///< Of an earlier run, to begin in, instead of a target; its frame is the path's.
   std::vector<DepthReading> depth_readings = {};  ///< In order of time: scale without a target, else a check of it.
+  /// Where the depth sensor is in the camera's frame; none: at its centre. σ of each coordinate: counted.
+  std::optional<Eigen::Vector3d> depth_arm_m = {};
+  std::optional<double> sigma_depth_arm_m = {};
   double sigma_depth_sensor = 0.01;  ///< Of the depths' scale, relative: fresh and sea water differ by 0.026.
   std::vector<RangeReading> range_readings = {};  ///< The same, of `beam`.
   std::optional<Beam> beam = {};

@@ -81,6 +81,15 @@ struct SensorScale {
   double jump_m = 0.0, jump_s = 0.0;  ///< By which a depth sensor reads more from a time on, where it does: corrected.
   /// Log of another scale over this one, that a rangefinder's readings have as well, of another surface; else 0.
   double other_log_scale = 0.0;
+  bool is_drifting = false;
+  double drift_m = 0.0;  ///< By which a depth sensor reads more at the end than at first, where it drifts: corrected.
+  /// Where a depth sensor is in the camera's frame, and σ, where it is not where it was said to be; else 0.
+  Eigen::Vector3d arm_m = Eigen::Vector3d::Zero(), sigma_arm_m = Eigen::Vector3d::Zero();
+  double arm_given_m = 0.0;  ///< How far from the camera it was said to be.
+  double arm_effect = 0.0;   ///< Change of ln scale for 1 cm of that, where it has no σ.
+  std::string unit;  ///< Of the readings, where a target shows that they are not in metres: "cm". Taken as such.
+  bool is_too_fast = false;   ///< By it the camera would accelerate so much that it is not used.
+  double noise_factor = 1.0;  ///< RMS of what is left of a depth sensor's readings, over their σ.
 };
 
 /// Mean radial residual in rings about the principal point.

@@ -48,6 +48,24 @@ double value_of(std::string_view given, const Camera& camera) {
   return lens[std::ranges::find(names, named->second) - names.begin()];
 }
 
+/// Where a depth sensor that gives the scale is.
+void add_depth_arm(const Localization& report, std::vector<Assumption>& assumed) {
+  constexpr double ordinary_m = 0.01;
+  double weights = 0.0;
+  for (const SensorScale& each : report.sensor_scales)
+    if (each.sigma_rel > 0.0) weights += 1.0 / (each.sigma_rel * each.sigma_rel);
+  for (const SensorScale& each : report.sensor_scales) {
+    if (!report.is_scale_read || !(each.sigma_rel > 0.0) || !(each.arm_effect > 0.0)) continue;
+    const double moved_by = each.arm_effect / (each.sigma_rel * each.sigma_rel * weights);
+    Assumption arm{.name = "depth_arm_m", .value = each.arm_given_m, .ordinary = ordinary_m};
+    arm.moves = moved_by * std::sqrt(weights);
+    arm.moved = "the scale";
+    arm.moved_by = moved_by;
+    arm.remedy = "measure where the depth sensor is in the camera's frame: --depth-arm, with --sigma-depth-arm";
+    assumed.push_back(arm);
+  }
+}
+
 }  // namespace
 
 std::vector<Assumption> localize_assumed(const Localization& report) {
@@ -74,6 +92,7 @@ std::vector<Assumption> localize_assumed(const Localization& report) {
                              : remedy_camera;
     assumed.push_back(each);
   }
+  add_depth_arm(report, assumed);
   return assumed;
 }
 

@@ -29,6 +29,12 @@ struct ReadScale {
   /// ln of another scale over this one, that at least half as many readings of a rangefinder have, of a surface before
   /// or behind; else 0.
   double other_log_scale = 0.0;
+  bool is_drifting = false;
+  double drift_m = 0.0;  ///< By which the offset of a depth sensor has changed at the end, where it drifts.
+  /// Where a depth sensor is in the camera's frame, with σ, where it is not where it was given; else 0.
+  Eigen::Vector3d arm_m = Eigen::Vector3d::Zero(), sigma_arm_m = Eigen::Vector3d::Zero();
+  double noise_factor = 1.0;  ///< RMS of what is left of a depth sensor's readings, over their σ.
+  double arm_effect = 0.0;    ///< Change of ln scale where a depth sensor's place, given without σ, is 1 cm off.
 };
 
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
@@ -50,12 +56,19 @@ struct ReadScale {
 [[nodiscard]] std::vector<PathStep> without_jitter(std::span<const PathStep> path, double half_s);
 constexpr double jitter_s = 0.4;
 
-/// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of
-/// what is left over, whose neighbours in time are alike, and `sigma_rel`, which all share. Readings far from all
-/// others are rejected; a clock that is up to a second off, a filter, and a jump of the offset are found by the
-/// residuals. None: the path moves too little up and down, or the readings do not fit it.
+/// Where a depth sensor is in the camera's frame [m].
+struct DepthArm {
+  Eigen::Vector3d in_cam_m = Eigen::Vector3d::Zero();
+  std::optional<double> sigma_m;  ///< Of each coordinate, which is then estimated. None: not known, and not counted.
+};
+
+/// depth = offset + g·r + down·R a of the camera's position r and rotation R, and the sensor's place a in the camera:
+/// of unknown offset and direction, |g| is the scale. Its σ is that of what is left over, whose neighbours in time are
+/// alike, and `sigma_rel`, which all share. Readings far from all others are rejected; a clock that is up to a second
+/// off, a filter, a jump or a drift of the offset, and another place than the given one are found by the residuals.
+/// None: the path moves too little up and down, or the readings do not fit it.
 [[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
-                                                      std::span<const PathStep> path);
+                                                      std::span<const PathStep> path, const DepthArm& arm = {});
 
 /// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
 /// readings near their median, with the scatter of blocks of them as its σ. Where their distances say so, all of them

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <optional>
 
 #include "alidade/localize.h"
 #include "alidade/testing/long_walk.h"
@@ -113,7 +115,33 @@ TEST(SensorScale, ADensityIsCountedAndAUnitNamed) {
   for (DepthReading& reading : config.depth_readings) reading.depth_m *= 100.0, reading.sigma_m *= 100.0;
   const Verdict in_cm = localize(run.frames, run.camera, config).verdict;
   EXPECT_NE(in_cm.state, State::good);
-  EXPECT_NE(in_cm.sentence.find("in metres?"), std::string::npos) << in_cm.sentence;
+  EXPECT_NE(in_cm.sentence.find("in metres? They are not used"), std::string::npos) << in_cm.sentence;
+  config.target.points = run.target;  // by which the unit is known
+  const Localization with_target = localize(run.frames, run.camera, config, run.truth);
+  ASSERT_EQ(with_target.sensor_scales.size(), 1u);
+  EXPECT_EQ(with_target.sensor_scales.front().unit, "cm");
+  EXPECT_NEAR(with_target.sensor_scales.front().scale, 1.026, 0.02);
+  EXPECT_EQ(with_target.verdict.state, State::care) << with_target.verdict.sentence;
+}
+
+/// A quarter of a metre before the camera, which is not known: the scale is as sure as that.
+TEST(SensorScale, WhereADepthSensorIsIsAssumed) {
+  const WalkRun run = long_walk(swimming(), 1);
+  LocalizeConfig config;
+  config.depth_readings = depths_of(run, 0.005, 1);
+  const auto row_of = [&] {
+    const std::vector<Assumption> assumed = localize(run.frames, run.camera, config).assumed;
+    const auto row = std::ranges::find(assumed, "depth_arm_m", &Assumption::name);
+    return row != assumed.end() ? std::optional(*row) : std::nullopt;
+  };
+  const auto unknown = row_of();
+  ASSERT_TRUE(unknown);
+  EXPECT_FALSE(unknown->sigma);
+  EXPECT_EQ(unknown->ordinary, 0.01);
+  EXPECT_GT(unknown->moves, 0.0);
+  EXPECT_LT(unknown->moves, 1.0);
+  config.sigma_depth_arm_m = 0.01;
+  EXPECT_FALSE(row_of());
 }
 
 TEST(SensorScale, AClockThatIsOffIsNamedAndCorrected) {

@@ -11,6 +11,20 @@
 namespace alidade {
 namespace {
 
+/// A depth sensor that is not where it was said to be.
+void add_arm(const SensorScale& sensor, Verdict& verdict) {
+  const auto three = [](const Eigen::Vector3d& each) {
+    return text_of(each.x(), 2) + ", " + text_of(each.y(), 2) + ", " + text_of(each.z(), 2);
+  };
+  verdict.checks.push_back(
+      {sensor.sensor + " arm", State::care,
+       (sensor.arm_given_m > 0.0 ? "the " + sensor.sensor + " seems to stand elsewhere than --depth-arm says, at "
+                                 : "the " + sensor.sensor + " seems to stand beside the camera, at ") +
+           three(sensor.arm_m) + " ± " + three(sensor.sigma_arm_m) +
+           " m in its frame: corrected; measure it (--depth-arm, --sigma-depth-arm)",
+       sensor.arm_m.norm(), 0.0, "m", "path"});
+}
+
 /// By how much a sensor's readings are late, filtered or too long.
 void add_corrected(const SensorScale& sensor, Verdict& verdict) {
   constexpr double unnamed_s = 0.1;  // beside a filter: what is left of its delay
@@ -29,6 +43,12 @@ void add_corrected(const SensorScale& sensor, Verdict& verdict) {
                               "the readings of the " + sensor.sensor + " jump by " + text_of(sensor.jump_m, 2) +
                                   " m at " + text_of(sensor.jump_s) + " s: corrected; was it set to zero, or moved?",
                               sensor.jump_m, 0.0, "m", "path"});
+  if (sensor.is_drifting)
+    verdict.checks.push_back({sensor.sensor + " drift", State::care,
+                              "the readings of the " + sensor.sensor + " drift, by " + text_of(sensor.drift_m, 2) +
+                                  " m in all: corrected; a tide, or a sensor that was not yet warm?",
+                              sensor.drift_m, 0.0, "m", "path"});
+  if (!sensor.arm_m.isZero(0.0)) add_arm(sensor, verdict);
   if (sensor.offset_m != 0.0)
     verdict.checks.push_back({sensor.sensor + " offset", State::care,
                               "the readings of the " + sensor.sensor + " are " + text_of(std::abs(sensor.offset_m), 2) +
@@ -51,6 +71,18 @@ void add_readings(const SensorScale& sensor, Verdict& verdict) {
                               "by the " + sensor.sensor + " the camera accelerates " + text_of(sensor.acceleration, 2) +
                                   " times as much as --sigma-a says: are its readings in metres?",
                               sensor.acceleration, fast, "1", "path"});
+  if (!sensor.unit.empty())
+    verdict.checks.push_back({sensor.sensor + " unit", State::care,
+                              "the readings of the " + sensor.sensor + " are in " + sensor.unit +
+                                  ", not in metres, as the target shows: taken as such",
+                              0.0, 0.0, "", "path"});
+  constexpr double noisy = 10.0;
+  if (sensor.unit.empty() && sensor.noise_factor > noisy)
+    verdict.checks.push_back({sensor.sensor + " noise", State::care,
+                              "what is left of the readings of the " + sensor.sensor + " is " +
+                                  text_of(sensor.noise_factor, 2) +
+                                  " times their σ (sigma_m, or 0.01 m): σ is enlarged for it; are they in metres?",
+                              sensor.noise_factor, noisy, "1", "path"});
   add_corrected(sensor, verdict);
 }
 
@@ -70,6 +102,9 @@ void add_hidden(const SensorScale& sensor, Verdict& verdict) {
 /// Why a sensor's readings do not determine the scale.
 std::string unread_text(const SensorScale& sensor, const Localization& report) {
   if (sensor.sensor == "IMU") return imu_fault_text(*report.imu);
+  if (sensor.is_too_fast)
+    return "by the " + sensor.sensor + " the camera accelerates " + text_of(sensor.acceleration, 2) +
+           " times as much as --sigma-a says: are its readings in metres? They are not used";
   return "the readings of the " + sensor.sensor + " do not determine the scale: " +
          (!sensor.is_in_time            ? "none of them is of the time of the path (t_s)"
           : sensor.sensor == "odometry" ? "too few of them, they do not fit the path, or the camera hardly moves"

@@ -3,87 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/geometry/so3.h"
-#include "alidade/localize/checks/scale_readings.h"
-#include "alidade/simulate/draws.h"
+#include "alidade/testing/swaying.h"
 
 // Readings beside the camera that are wrong in an ordinary way, with a path and a map in metres: the scale is 1.
 
 namespace alidade {
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
-
-/// A path of three slow oscillations along each axis, with smooth errors of 0.3 mm.
-struct Swaying {
-  explicit Swaying(std::uint64_t seed, double fastest_hz = 0.25) {
-    Draws draws(seed);
-    for (Eigen::Matrix3d* each : {&amplitude, &rate, &phase})
-      for (double& value : each->reshaped()) value = draws.uniform(0.0, 1.0);
-    amplitude = (0.3 + 0.7 * amplitude.array()).matrix();
-    const Eigen::Vector3d sizes(0.25, 0.15, 0.12), along(1.0, 0.6, 0.4);
-    amplitude = sizes.asDiagonal() * amplitude * along.asDiagonal();
-    rate = (2.0 * pi * (0.05 + (fastest_hz - 0.05) * rate.array())).matrix();
-    phase *= 2.0 * pi;
-  }
-  [[nodiscard]] Eigen::Vector3d at(double t_s) const {
-    return (amplitude.array() * (rate.array() * t_s + phase.array()).sin()).rowwise().sum();
-  }
-  /// A camera that is held by hand: up to so much about each axis.
-  double turning_rad = 0.0;
-  [[nodiscard]] Eigen::Quaterniond attitude(double t_s) const {
-    const Eigen::Vector3d turn((rate(0, 1) * t_s + phase(2, 0)), (rate(1, 2) * t_s + phase(2, 1)),
-                               (rate(2, 0) * t_s + phase(2, 2)));
-    return exp_so3(turning_rad * turn.array().sin().matrix());
-  }
-  [[nodiscard]] std::vector<PathStep> path(double duration_s) const {
-    std::vector<PathStep> steps;
-    for (int k = 0; k < 30 * duration_s; ++k) {
-      PathStep step;
-      step.frame = k;
-      step.t_s = k / 30.0;
-      step.event = FrameEvent::tracked;
-      const Eigen::Vector3d error(std::sin(1.3 * step.t_s), std::sin(0.9 * step.t_s), std::cos(1.1 * step.t_s));
-      step.world_from_cam = {attitude(step.t_s), at(step.t_s) + 3e-4 * error};
-      steps.push_back(step);
-    }
-    return steps;
-  }
-  Eigen::Matrix3d amplitude, rate, phase;
-};
+using testing::Drawn;
+using testing::drawn_of;
+using testing::Swaying;
 
 constexpr double duration_s = 20.0, every_s = 0.1;
 constexpr int num_readings = 190;
-
-struct Drawn {
-  int given = 0, beyond_5_sigma = 0, silent = 0, beyond_3_sigma = 0, clocks = 0, filters = 0, jumps = 0;
-  double worst = 0.0, largest_sigma = 0.0;
-
-  void add(const std::optional<ReadScale>& read) {
-    if (!read) return;
-    ++given;
-    const double z = std::abs(std::log(read->scale)) / read->sigma_rel;
-    beyond_5_sigma += z > 5.0;
-    beyond_3_sigma += z > 3.0;
-    silent += z > 5.0 && read->late_s == 0.0 && read->lag_s == 0.0 && read->hidden_offset_rel == 0.0;
-    clocks += read->late_s != 0.0;
-    filters += read->lag_s > 0.0;
-    jumps += read->jump_m != 0.0;
-    worst = std::max(worst, z);
-    largest_sigma = std::max(largest_sigma, read->sigma_rel);
-  }
-};
-
-/// Of so many paths: `scale_of(path, seed)`.
-template <class ScaleOf>
-Drawn drawn_of(int num, const ScaleOf& scale_of) {
-  Drawn drawn;
-  for (int i = 1; i <= num; ++i) {
-    const auto seed = static_cast<std::uint64_t>(i);
-    drawn.add(scale_of(Swaying(seed), seed));
-  }
-  return drawn;
-}
 
 // ---- odometry
 
@@ -189,70 +121,6 @@ TEST(SensorFaults, NoiseOfOdometryLengthensNothing) {
     EXPECT_EQ(wrong.filters + wrong.clocks, 0) << static_cast<int>(fault);
     EXPECT_LT(wrong.largest_sigma, fault == WheelFault::noisy ? 0.2 : 0.03);
   }
-}
-
-// ---- a depth sensor
-
-enum class DepthFault { none, filtered, jumping, late, tide, bubbles };
-
-std::vector<DepthReading> depths(const Swaying& swaying, DepthFault fault, std::uint64_t seed) {
-  Draws draws(seed + 2000);
-  std::vector<DepthReading> readings;
-  const Eigen::Vector3d down = Eigen::Vector3d(0.2, 0.95, 0.3).normalized();
-  const double common = 1.0 + 0.01 * draws.normal(), lag_s = 0.5, fine_s = 0.005;
-  double filtered = down.dot(swaying.at(0.0));
-  Draws of_jump(seed + 3000);
-  const int jumps_at = static_cast<int>(num_readings * of_jump.uniform(0.15, 0.85));
-  const double jump_m = (seed % 2 == 0 ? 1.0 : -1.0) * of_jump.uniform(0.05, 1.0);
-  for (int i = 0; i < num_readings; ++i) {
-    const double t_s = every_s * i;
-    for (double s = t_s - every_s; i > 0 && s < t_s - 1e-9; s += fine_s)
-      filtered += fine_s / lag_s * (down.dot(swaying.at(s)) - filtered);
-    const double depth = fault == DepthFault::filtered ? filtered : down.dot(swaying.at(t_s));
-    const double offset = fault == DepthFault::jumping && i >= jumps_at ? 7.0 + jump_m : 7.0;
-    const double other = fault == DepthFault::tide                                 ? 0.02 * t_s
-                         : fault == DepthFault::bubbles && of_jump.uniform() < 0.1 ? of_jump.normal()
-                                                                                   : 0.0;
-    const double stamp_s = fault == DepthFault::late ? t_s + 0.3 : t_s;
-    readings.push_back({stamp_s, offset + other + common * depth + 0.005 * draws.normal(), 0.005});
-  }
-  return readings;
-}
-
-Drawn drawn_depths(DepthFault fault, int num) {
-  return drawn_of(num, [&](const Swaying& swaying, std::uint64_t seed) {
-    return scale_by_depth(depths(swaying, fault, seed), 0.01, swaying.path(duration_s));
-  });
-}
-
-TEST(SensorFaults, DepthsAsTheyShouldBeGiveTheirScale) {
-  const Drawn right = drawn_depths(DepthFault::none, 100);
-  EXPECT_EQ(right.given, 100);
-  EXPECT_LE(right.clocks, 1);
-  EXPECT_LE(right.beyond_3_sigma, 2);
-  EXPECT_LT(right.largest_sigma, 0.03);
-}
-
-/// A filter looks like a late clock: corrected as one it left the path 6 to 11 % too short, at 6 to 8σ.
-TEST(SensorFaults, AFilteredDepthIsNoLateClock) {
-  const Drawn filtered = drawn_depths(DepthFault::filtered, 40);
-  EXPECT_EQ(filtered.silent, 0) << filtered.worst;
-  EXPECT_GE(filtered.filters, 30);  // the others are named as a late clock
-}
-
-/// A sensor that is set to zero on the way: the rest of the path lay deeper by the jump, with a filter of 2 s that none
-/// has (scale 0.41 and 0.10 of what it is, at 16 to 20σ). Neither a late clock nor a filter nor a tide is taken for a
-/// jump.
-TEST(SensorFaults, AJumpOfTheDepthIsFoundAndNoOther) {
-  const Drawn jumping = drawn_depths(DepthFault::jumping, 40);
-  EXPECT_EQ(jumping.jumps, 40);
-  EXPECT_EQ(jumping.filters, 0);
-  EXPECT_EQ(jumping.beyond_5_sigma, 0) << jumping.worst;
-  EXPECT_LE(jumping.beyond_3_sigma, 2);
-  EXPECT_LT(jumping.largest_sigma, 0.05);
-  for (const DepthFault fault :
-       {DepthFault::none, DepthFault::filtered, DepthFault::late, DepthFault::tide, DepthFault::bubbles})
-    EXPECT_EQ(drawn_depths(fault, 100).jumps, 0) << static_cast<int>(fault);
 }
 
 // ---- a rangefinder

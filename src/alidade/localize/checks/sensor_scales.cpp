@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "alidade/localize/checks/scale_readings.h"
 
@@ -26,33 +28,65 @@ double rms_acceleration(std::span<const PathStep> path) {
   return num > 0.0 ? std::sqrt(squares / num) : 0.0;
 }
 
+void take_read(const ReadScale& read, SensorScale& scale) {
+  scale.scale = read.scale;
+  scale.sigma_rel = read.sigma_rel;
+  scale.num_used = read.num_used;
+  scale.num_rejected = read.num_rejected;
+  scale.late_s = read.late_s;
+  scale.offset_m = read.offset_m;
+  scale.aside_rad = read.aside_rad;
+  scale.hidden_offset_rel = read.hidden_offset_rel;
+  scale.lag_s = read.lag_s;
+  scale.jump_m = read.jump_m;
+  scale.jump_s = read.jump_s;
+  scale.other_log_scale = read.other_log_scale;
+  scale.is_drifting = read.is_drifting;
+  scale.drift_m = read.drift_m;
+  scale.arm_m = read.arm_m;
+  scale.sigma_arm_m = read.sigma_arm_m;
+  scale.arm_effect = read.arm_effect;
+  scale.noise_factor = read.noise_factor;
+}
+
+/// Units in which readings are given in error: by a target each of them is known for what it is.
+void take_unit(SensorScale& scale) {
+  constexpr double near = 0.1;
+  constexpr std::array<std::pair<const char*, double>, 3> units{{{"cm", 100.0}, {"mm", 1000.0}, {"feet", 3.2808}}};
+  for (const auto& [name, per_metre] : units) {
+    if (std::abs(std::log(scale.scale / per_metre)) > near) continue;
+    scale.unit = name;
+    scale.scale /= per_metre;
+    scale.acceleration /= per_metre;
+  }
+}
+
+/// What a sensor's unit may be wrong by: with a target that is known, without one a camera that would accelerate so
+/// much shows it. A path by such a scale fits nothing.
+void check_unit(bool has_target, SensorScale& scale) {
+  constexpr double too_fast = 10.0;
+  if (!(scale.sigma_rel > 0.0)) return;
+  if (has_target) return take_unit(scale);
+  scale.is_too_fast = scale.acceleration > too_fast;
+  if (scale.is_too_fast) scale.sigma_rel = 0.0;
+}
+
 }  // namespace
 
 void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result) {
   result.sensor_scales.clear();
   const double acceleration = rms_acceleration(result.path);
   const auto add = [&](const char* sensor, const auto& readings, const std::optional<ReadScale>& read) {
-    SensorScale scale{sensor};
-    if (read)
-      scale = {sensor,
-               read->scale,
-               read->sigma_rel,
-               read->num_used,
-               read->num_rejected,
-               true,
-               read->late_s,
-               read->offset_m,
-               read->aside_rad,
-               read->hidden_offset_rel,
-               read->lag_s,
-               read->scale * acceleration / config.filter.sigma_a_m_s2,
-               read->jump_m,
-               read->jump_s,
-               read->other_log_scale};
+    SensorScale scale;
+    scale.sensor = sensor;
+    if (read) take_read(*read, scale);
+    scale.acceleration = scale.scale * acceleration / config.filter.sigma_a_m_s2;
+    scale.arm_given_m = config.depth_arm_m.value_or(Eigen::Vector3d::Zero()).norm();
     if (!result.has_target) {  // nothing says which
       scale.sigma_rel = read ? std::hypot(read->sigma_rel, 0.5 * read->other_log_scale) : 0.0;
       scale.other_log_scale = 0.0;
     }
+    check_unit(result.has_target, scale);
     scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {
       return !result.path.empty() && reading.t_s >= result.path.front().t_s && reading.t_s <= result.path.back().t_s;
     });
@@ -60,7 +94,8 @@ void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Lo
   };
   if (!config.depth_readings.empty())
     add("depth sensor", config.depth_readings,
-        scale_by_depth(config.depth_readings, config.sigma_depth_sensor, result.path));
+        scale_by_depth(config.depth_readings, config.sigma_depth_sensor, result.path,
+                       {config.depth_arm_m.value_or(Eigen::Vector3d::Zero()), config.sigma_depth_arm_m}));
   if (!config.range_readings.empty() && config.beam)
     add("rangefinder", config.range_readings, scale_by_range(config.range_readings, *config.beam, result.path, map));
   if (!config.odometry_readings.empty())
@@ -73,8 +108,13 @@ void add_imu_scale(const LocalizeConfig& config, Localization& result) {
   if (!result.imu) result.imu = ImuEstimate{.fault = ImuFault::unsettled};
   const ImuEstimate& imu = *result.imu;
   const bool is_used = imu.fault == ImuFault::none;
-  result.sensor_scales.push_back({"IMU", is_used ? imu.scale : 1.0, is_used ? imu.sigma_scale : 0.0, imu.num_steps,
-                                  imu.num_rejected, imu.fault != ImuFault::other_time});
+  SensorScale scale;
+  scale.sensor = "IMU";
+  if (is_used) scale.scale = imu.scale, scale.sigma_rel = imu.sigma_scale;
+  scale.num_used = imu.num_steps;
+  scale.num_rejected = imu.num_rejected;
+  scale.is_in_time = imu.fault != ImuFault::other_time;
+  result.sensor_scales.push_back(scale);
 }
 
 double sigma_target_scale(std::span<const MapPoint> map) {

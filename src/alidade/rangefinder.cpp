@@ -8,6 +8,7 @@
 
 #include "alidade/board_detector/board_guess.h"
 #include "alidade/camera/camera_fault.h"
+#include "alidade/rangefinder/checks/repeated_shots.h"
 #include "alidade/rangefinder/checks/shot_checks.h"
 #include "alidade/rangefinder/rangefinder.h"
 #include "alidade/rangefinder/shot_photos.h"
@@ -110,6 +111,18 @@ void refuse(const WrongBoard& wrong, const Camera& camera, RangefinderCalibratio
                     .checks = {}};
 }
 
+/// The shots of one placement of the board as one.
+void average_placements(RangefinderCalibration& result) {
+  AveragedShots averaged = averaged_shots(result.measured);
+  std::vector<ShotPhoto> photos;
+  for (const std::size_t first : averaged.first)
+    if (first < result.photos.size()) photos.push_back(std::move(result.photos[first]));
+  result.photos = std::move(photos);
+  result.measured = std::move(averaged.shots);
+  result.repeated = std::move(averaged.repeated);
+  result.counts.skipped.insert(result.counts.skipped.end(), result.repeated.begin(), result.repeated.end());
+}
+
 /// What stands beside the answer: what more shots bring, and how well each shot is predicted by the others.
 void study(RangefinderCalibration& result, const Camera& camera, const Progress& progress) {
   const std::vector<Eigen::Vector3d> points = points_of(result.config);
@@ -137,12 +150,13 @@ RangefinderCalibration rangefinder(std::vector<Shot> shots, const Camera& camera
       return result;
     }
   }
+  average_placements(result);
   SolvedRangefinder solved = solve_rangefinder(result.measured, points_of(config), camera, config, progress);
   static_cast<RangefinderReport&>(result) = std::move(solved.report);
   result.config = std::move(solved.config);
   result.verdict = std::move(solved.verdict);
   result.counts.used = static_cast<std::size_t>(result.shots_used);
-  result.counts.dropped = static_cast<std::size_t>(result.shots_dropped);
+  result.counts.dropped = static_cast<std::size_t>(result.shots_dropped) + result.repeated.size();
   if (result.status == RangefinderReport::Status::converged) study(result, solved.camera, progress);
   if (result.verdict.exit_code == ExitCode::ok) heed_assumptions(result.assumed, result.verdict);
   return result;

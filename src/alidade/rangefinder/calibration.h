@@ -40,11 +40,12 @@ struct ShotPhoto {
 /// Everything that a calibration of a rangefinder has to say: what the solve found (beam, camera, shots …), and what it
 /// is worth. `by_count`, `left_out` and `gains` are empty where there is no beam.
 struct RangefinderCalibration : RangefinderReport {
-  std::vector<Shot> measured;     ///< With what their photos gave; `shots` says what became of each.
+  std::vector<Shot> measured;     ///< One a placement, with what their photos gave; `shots` says what became of each.
   std::vector<ShotPhoto> photos;  ///< One per shot, where photos were looked at.
   std::vector<Shot> unreadable;   ///< Shots whose photos could not be used; `counts.skipped` says why, in order.
-  RangefinderConfig config;       ///< As used: a scale that nobody gave may be estimated.
-  Eigen::MatrixXd covariance;     ///< Of origin, direction (singular along itself) and scale: embedded_covariance().
+  std::vector<SkippedInput> repeated;  ///< Averaged with the first of their placement; in `counts.skipped`, too.
+  RangefinderConfig config;            ///< As used: a scale that nobody gave may be estimated.
+  Eigen::MatrixXd covariance;  ///< Of origin, direction (singular along itself) and scale: embedded_covariance().
   std::vector<std::string> parameter_names;  ///< Of `covariance`.
   std::vector<CountedSigma> by_count;        ///< σ against the number of shots.
   std::vector<LeftOutShot> left_out;         ///< Each shot predicted by the others.

@@ -282,6 +282,9 @@ std::vector<std::string> lines_of_shots(const RangefinderCalibration& result) {
     if (!fit.used && !fit.reason.empty())
       lines.push_back(fmt::format("not used: {}: {}", result.measured[i].name, fit.reason));
   }
+  if (!result.repeated.empty())
+    lines.push_back(fmt::format("averaged: {} of {} shots are of the placement of the shot before",
+                                result.repeated.size(), result.counts.given));
   return lines;
 }
 

@@ -1,59 +1,37 @@
 #include "alidade/rig/checks/repeated_stops.h"
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "alidade/board/same_place.h"
 #include "alidade/geometry/degree.h"
 
 namespace alidade {
 namespace {
 
-using Corners = std::map<int, Eigen::Vector2d>;
-
-Corners by_number(const BoardView& view) {
-  Corners corners;
-  for (const Corner& corner : view.corners) corners.emplace(corner.index, corner.px);
-  return corners;
-}
-
 /// The views of a stop so far.
 class Stop {
  public:
-  Stop(const HeadView& first, std::size_t at) : first_(first), corners_(by_number(first.seen)), at_(at) { add(first); }
+  Stop(const HeadView& first, std::size_t at) : first_(first), at_(at) { add(first); }
 
   [[nodiscard]] std::size_t at() const { return at_; }
 
   [[nodiscard]] bool has(const HeadView& view) const {
     constexpr double near_px = 1.0, near_rad = 0.1 * degree;
-    if (view.board != first_.board || !((view.pan_tilt_rad - first_.pan_tilt_rad).cwiseAbs().maxCoeff() <= near_rad))
-      return false;
-    std::size_t common = 0;
-    for (const Corner& corner : view.seen.corners) {
-      const auto same = corners_.find(corner.index);
-      if (same == corners_.end()) continue;
-      if (!((corner.px - same->second).squaredNorm() <= near_px * near_px)) return false;
-      ++common;
-    }
-    return common > 0 && 5 * common >= 4 * std::max(corners_.size(), view.seen.corners.size());
+    return view.board == first_.board && (view.pan_tilt_rad - first_.pan_tilt_rad).cwiseAbs().maxCoeff() <= near_rad &&
+           at_one_place(first_.seen, view.seen, near_px);
   }
 
   void add(const HeadView& view) {
     readings_.push_back(view.pan_tilt_rad);
-    for (const Corner& corner : view.seen.corners) {
-      auto& [sum, count] = sums_.try_emplace(corner.index, Eigen::Vector2d::Zero(), 0).first->second;
-      sum += corner.px;
-      ++count;
-    }
+    seen_.push_back(view.seen);
   }
 
-  /// The mean of its views, of the corners that the first has.
-  void average(HeadView& first) const {
-    first.pan_tilt_rad = mean_reading();
-    for (Corner& corner : first.seen.corners) {
-      const auto& [sum, count] = sums_.at(corner.index);
-      corner.px = sum / count;
-    }
+  [[nodiscard]] HeadView averaged() const {
+    HeadView view = first_;
+    view.pan_tilt_rad = mean_reading();
+    view.seen.corners = mean_corners(seen_);
+    return view;
   }
 
   [[nodiscard]] double squares_within() const {
@@ -71,10 +49,9 @@ class Stop {
   }
 
   HeadView first_;
-  Corners corners_;
   std::size_t at_;
   std::vector<Eigen::Vector2d> readings_;
-  std::map<int, std::pair<Eigen::Vector2d, int>> sums_;
+  std::vector<BoardView> seen_;
 };
 
 }  // namespace
@@ -84,7 +61,8 @@ AveragedStops averaged_stops(std::span<const HeadView> views) {
   std::map<int, Stop> last;  // of each head
   double squares = 0.0, freedom = 0.0;
   const auto leave = [&](const Stop& stop) {
-    stop.average(result.views[stop.at()]);
+    if (!(stop.freedom_within() > 0.0)) return;
+    result.views[stop.at()] = stop.averaged();
     squares += stop.squares_within();
     freedom += stop.freedom_within();
   };

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/board/board_view.h"
+
+namespace alidade {
+
+/// Whether two views show the board at one place in the image: four in five of the corners of each are in both, all of
+/// these within `near_px`.
+[[nodiscard]] bool at_one_place(const BoardView& a, const BoardView& b, double near_px);
+
+/// The corners of the first view, each the mean over the views that have it.
+[[nodiscard]] std::vector<Corner> mean_corners(std::span<const BoardView> views);
+
+}  // namespace alidade

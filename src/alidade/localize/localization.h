@@ -87,6 +87,8 @@ struct SensorScale {
   Eigen::Vector3d arm_m = Eigen::Vector3d::Zero(), sigma_arm_m = Eigen::Vector3d::Zero();
   double arm_given_m = 0.0;  ///< How far from the camera it was said to be.
   double arm_effect = 0.0;   ///< Change of ln scale for 1 cm of that, where it has no σ.
+  /// When odometry's wheels slip most, and its way over the path's there: left out. 0: they do not.
+  double slip_from_s = 0.0, slip_to_s = 0.0, slip_ratio = 0.0;
   std::string unit;  ///< Of the readings, where a target shows that they are not in metres: "cm". Taken as such.
   bool is_too_fast = false;   ///< By it the camera would accelerate so much that it is not used.
   double noise_factor = 1.0;  ///< RMS of what is left of a depth sensor's readings, over their σ.

@@ -64,10 +64,11 @@ std::vector<OdometryReading> without_far(std::span<const OdometryReading> readin
 /// At the times of the readings, by a clock that is late by so much.
 std::vector<Place> places_of(std::span<const OdometryReading> readings, double late_s, std::span<const PathStep> path) {
   std::vector<Place> places;
-  for (const OdometryReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s - late_s);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const double t_s = readings[i].t_s - late_s;
+    const auto pose = pose_at(path, t_s);
     if (!pose) continue;
-    Place place{pose->translation, reading.position_m, 0.0, position_cov_at(path, reading.t_s - late_s).trace()};
+    Place place{pose->translation, readings[i].position_m, 0.0, position_cov_at(path, t_s).trace(), i};
     if (!places.empty()) place.way_m = places.back().way_m + (place.of_path - places.back().of_path).norm();
     places.push_back(place);
   }
@@ -257,31 +258,70 @@ Followed averaged(Followed clock, const std::vector<Followed>& filters) {
   return chosen;
 }
 
-}  // namespace
-
-std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> given, double sigma_rel,
-                                           std::span<const PathStep> path) {
-  const std::vector<OdometryReading> near = without_far(given, path);
-  const std::span<const OdometryReading> readings = near;
-  const std::size_t num_far = given.size() - readings.size();
+/// With the clock and the filter that they show.
+std::optional<Followed> followed_best(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
   auto clock = followed(readings, 0.0, clock_of(readings, path), path);
   if (!clock) return std::nullopt;
   const auto smooth = followed(readings, 0.0, clock->late_s, without_jitter(path, jitter_s));
   if (smooth && smooth->fit.misfit_m2 < clock->fit.misfit_m2) clock->fit = smooth->fit;
   const std::vector<Followed> filters = filters_of(readings, *clock, path);
-  const Followed found = averaged(*std::move(clock), filters);
+  return averaged(*std::move(clock), filters);
+}
+
+/// As if the wheels had not slipped there: what is behind goes back by as much.
+std::vector<OdometryReading> without_slip(std::span<const OdometryReading> readings, std::span<const Place> places,
+                                          const Slip& slip) {
+  std::vector<OdometryReading> mended(readings.begin(), readings.end());
+  Eigen::Vector3d excess = Eigen::Vector3d::Zero();
+  std::size_t step = slip.begin;
+  for (std::size_t i = 0; i < mended.size(); ++i) {
+    while (step < slip.end && places[step + 1].reading <= i) excess += slip.excess[step++ - slip.begin];
+    mended[i].position_m -= excess;
+  }
+  return mended;
+}
+
+/// With the stretches left out on which wheels slip, as far as the rest then fits clearly better.
+std::optional<Followed> followed_without_slips(std::vector<OdometryReading>& readings, std::span<const PathStep> path,
+                                               ReadScale& read) {
+  constexpr int most = 3;
+  constexpr double better = 0.8;
+  auto found = followed_best(readings, path);
+  double longest = 0.0;
+  for (int i = 0; found && i < most; ++i) {
+    const auto slip = slip_of(found->places);
+    if (!slip) break;
+    std::vector<OdometryReading> mended = without_slip(readings, found->places, *slip);
+    auto again = followed_best(mended, path);
+    if (!again || !(again->fit.misfit_m2 < better * found->fit.misfit_m2)) break;
+    const double from_s = readings[found->places[slip->begin].reading].t_s,
+                 to_s = readings[found->places[slip->end].reading].t_s;
+    if (to_s - from_s > longest)
+      longest = to_s - from_s, read.slip_from_s = from_s, read.slip_to_s = to_s, read.slip_ratio = slip->ratio;
+    readings = std::move(mended);
+    found = std::move(again);
+  }
+  return found;
+}
+
+}  // namespace
+
+std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> given, double sigma_rel,
+                                           std::span<const PathStep> path) {
+  std::vector<OdometryReading> readings = without_far(given, path);
+  const std::size_t num_far = given.size() - readings.size();
+  ReadScale read;
+  const auto found = followed_without_slips(readings, path, read);
+  if (!found) return std::nullopt;
   const bool is_in_plane = std::ranges::all_of(
       readings, [&](const OdometryReading& each) { return each.position_m.z() == readings.front().position_m.z(); });
-  const double lost = is_in_plane ? out_of_plane(found.places) : 0.0;
-  ReadScale read{std::exp(found.scale.log),
-                 std::hypot(std::hypot(found.scale.sigma, found.fit.persistent, sigma_rel), lost),
-                 found.scale.num_used,
-                 found.scale.num_given - found.scale.num_used + num_far,
-                 found.late_s,
-                 0.0,
-                 0.0,
-                 0.0,
-                 found.tau_s};
+  const double lost = is_in_plane ? out_of_plane(found->places) : 0.0;
+  read.scale = std::exp(found->scale.log);
+  read.sigma_rel = std::hypot(std::hypot(found->scale.sigma, found->fit.persistent, sigma_rel), lost);
+  read.num_used = found->scale.num_used;
+  read.num_rejected = found->scale.num_given - found->scale.num_used + num_far;
+  read.late_s = found->late_s;
+  read.lag_s = found->tau_s;
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }

@@ -150,27 +150,100 @@ double scatter_of(const AllSums& all) {
   return num > 1.0 ? std::max(1.0, chi2 / (num - 1.0)) : 1.0;
 }
 
-}  // namespace
+/// Steps as they fit the path, those far from all others not used.
+struct FittedSteps {
+  std::vector<Step> steps;
+  StepNoise noise;
+  AllSums all;
+};
 
-std::optional<StepScale> scale_by_steps(std::span<const Place> places) {
+std::optional<FittedSteps> fitted_steps(std::span<const Place> places) {
   constexpr std::size_t enough = 10;
   constexpr int rounds = 3;
   constexpr double rejected_beyond = 4.0, three = 3.0;  // σ, coordinates
   if (places.size() <= enough || !(places.back().way_m > 0.0)) return std::nullopt;
-  std::vector<Step> steps = steps_of(places);
-  StepNoise noise;
+  FittedSteps fitted{steps_of(places), {}, {}};
   for (int round = 0; round < rounds; ++round) {
-    take_left(all_sums(steps, noise), steps);
-    noise = noise_of(steps);
-    const double limit = rejected_beyond * rejected_beyond * three * noise.of_step();
-    for (Step& step : steps) step.is_used = step.left.squaredNorm() <= limit;
+    take_left(all_sums(fitted.steps, fitted.noise), fitted.steps);
+    fitted.noise = noise_of(fitted.steps);
+    const double limit = rejected_beyond * rejected_beyond * three * fitted.noise.of_step();
+    for (Step& step : fitted.steps) step.is_used = step.left.squaredNorm() <= limit;
   }
-  const AllSums all = all_sums(steps, noise);
-  const double scale = all.scale();
-  if (!(scale > 0.0)) return std::nullopt;
-  StepScale found{std::log(scale), std::sqrt(scatter_of(all) / all.den) / scale, steps.size()};
+  fitted.all = all_sums(fitted.steps, fitted.noise);
+  return fitted.all.scale() > 0.0 ? std::optional(std::move(fitted)) : std::nullopt;
+}
+
+/// A stretch of steps against all: what its own scale gains of χ².
+struct Stretch {
+  std::size_t begin = 0, end = 0;
+  double ratio = 1.0, gain = 0.0;
+};
+
+Stretch stretch_of(std::span<const Step> in_path, const StepNoise& noise, double scale, std::size_t begin,
+                   std::size_t end) {
+  const std::span<const Step> chain = in_path.subspan(begin, end - begin);
+  const std::vector<Eigen::Vector3d> x = weighed(chain, noise);
+  double num = 0.0, den = 0.0;
+  for (std::size_t i = 0; i < chain.size(); ++i)
+    num += x[i].dot(chain[i].of_vehicle), den += x[i].dot(chain[i].of_path);
+  if (!(den > 0.0)) return {begin, end};
+  return {begin, end, num / (den * scale), (num - scale * den) * (num - scale * den) / den};
+}
+
+/// Of all stretches that of most gain, its ends as they are best.
+Stretch most_gain(std::span<const Step> in_path, const StepNoise& noise, double scale) {
+  constexpr std::size_t fewest = 5, longest = 4;  // of all a quarter
+  const std::size_t num = in_path.size();
+  Stretch best;
+  const auto look = [&](std::size_t begin, std::size_t end) {
+    if (begin + fewest > end || end > num || longest * (end - begin) > num) return false;
+    const Stretch one = stretch_of(in_path, noise, scale, begin, end);
+    if (one.gain > best.gain) best = one;
+    return one.gain >= best.gain;
+  };
+  for (const std::size_t part : {4, 8, 16, 32}) {
+    const std::size_t length = std::max(num / part, fewest);
+    for (std::size_t begin = 0; begin + length <= num; begin += std::max(length / 4, std::size_t{1}))
+      look(begin, begin + length);
+  }
+  for (double last = 0.0; best.gain > last;) {
+    last = best.gain;
+    const Stretch at = best;
+    look(at.begin + 1, at.end), look(at.begin, at.end + 1), look(at.begin, at.end - 1);
+    if (at.begin > 0) look(at.begin - 1, at.end);
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<StepScale> scale_by_steps(std::span<const Place> places) {
+  const auto fitted = fitted_steps(places);
+  if (!fitted) return std::nullopt;
+  const AllSums& all = fitted->all;
+  StepScale found{std::log(all.scale()), std::sqrt(scatter_of(all) / all.den) / all.scale(), fitted->steps.size()};
   for (const PartSums& part : all.parts) found.num_used += part.num_steps;
   return found;
+}
+
+std::optional<Slip> slip_of(std::span<const Place> places) {
+  constexpr double clear = 30.0, least = 0.1;
+  const auto fitted = fitted_steps(places);
+  if (!fitted) return std::nullopt;
+  const double scale = fitted->all.scale();
+  std::vector<Step> in_path = fitted->steps;
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < in_path.size(); ++i) {
+    if (i > 0 && in_path[i].part != in_path[i - 1].part) ++at;
+    const Eigen::Matrix3d path_from_vehicle = fitted->all.parts[at].vehicle_from_path.transpose();
+    in_path[i].of_vehicle = path_from_vehicle * in_path[i].of_vehicle;
+    if (!in_path[i].is_used) in_path[i].of_vehicle = scale * in_path[i].of_path;
+  }
+  const Stretch best = most_gain(in_path, fitted->noise, scale);
+  if (!(best.gain > clear) || !(std::abs(std::log(std::abs(best.ratio))) > least)) return std::nullopt;
+  Slip slip{best.begin, best.end, best.ratio, {}};
+  for (std::size_t i = best.begin; i < best.end; ++i) slip.excess.push_back(fitted->steps[i].left);
+  return slip;
 }
 
 }  // namespace alidade

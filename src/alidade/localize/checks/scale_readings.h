@@ -29,6 +29,7 @@ struct ReadScale {
   /// ln of another scale over this one, that at least half as many readings of a rangefinder have, of a surface before
   /// or behind; else 0.
   double other_log_scale = 0.0;
+  double slip_from_s = 0.0, slip_to_s = 0.0, slip_ratio = 0.0;  ///< When odometry slips most, and by what factor.
   bool is_drifting = false;
   double drift_m = 0.0;  ///< By which the offset of a depth sensor has changed at the end, where it drifts.
   /// Where a depth sensor is in the camera's frame, with σ, where it is not where it was given; else 0.

@@ -48,6 +48,12 @@ void add_corrected(const SensorScale& sensor, Verdict& verdict) {
                               "the readings of the " + sensor.sensor + " drift, by " + text_of(sensor.drift_m, 2) +
                                   " m in all: corrected; a tide, or a sensor that was not yet warm?",
                               sensor.drift_m, 0.0, "m", "path"});
+  if (sensor.slip_ratio > 0.0)
+    verdict.checks.push_back({sensor.sensor + " slip", State::care,
+                              "the " + sensor.sensor + " slips: from " + text_of(sensor.slip_from_s) + " to " +
+                                  text_of(sensor.slip_to_s) + " s its way is " + text_of(sensor.slip_ratio, 2) +
+                                  " times the path's: left out",
+                              sensor.slip_ratio, 1.0, "1", "path"});
   if (!sensor.arm_m.isZero(0.0)) add_arm(sensor, verdict);
   if (sensor.offset_m != 0.0)
     verdict.checks.push_back({sensor.sensor + " offset", State::care,

@@ -19,7 +19,7 @@ constexpr int num_readings = 190;
 
 // ---- odometry
 
-enum class WheelFault { right, slipping, filtered, sampled, averaged, in_a_plane, late, noisy, lifted };
+enum class WheelFault { right, slipping, filtered, sampled, averaged, in_a_plane, late, noisy, lifted, slipping_once };
 
 std::vector<OdometryReading> odometry(const Swaying& swaying, WheelFault fault, std::uint64_t seed) {
   Draws draws(seed + 1000);
@@ -31,7 +31,9 @@ std::vector<OdometryReading> odometry(const Swaying& swaying, WheelFault fault, 
     const double t_s = every_s * i;
     const Eigen::Vector3d place = swaying.at(t_s);
     if (i > 0) {
-      slipped += (draws.uniform(0.0, 1.0) < 0.2 ? 1.5 : 1.0) * (place - swaying.at(t_s - every_s));
+      const bool slips = fault == WheelFault::slipping_once ? t_s > 8.0 && t_s < 11.0 : draws.uniform(0.0, 1.0) < 0.2;
+      const double slip = fault == WheelFault::slipping_once ? 1.4 : 1.5;
+      slipped += (slips ? slip : 1.0) * (place - swaying.at(t_s - every_s));
       for (double s = t_s - every_s; s < t_s - 1e-9; s += fine_s)
         filtered += fine_s / lag_s * (swaying.at(s) - filtered);
       of_samples += every_s / lag_s * (place - of_samples);
@@ -39,11 +41,11 @@ std::vector<OdometryReading> odometry(const Swaying& swaying, WheelFault fault, 
     Eigen::Vector3d average = Eigen::Vector3d::Zero();
     constexpr int num = 16;  // of the last 0.8 s
     for (int k = 0; k < num; ++k) average += swaying.at(std::max(0.0, t_s - 2.0 * lag_s * k / num)) / num;
-    Eigen::Vector3d read = common * (fault == WheelFault::slipping   ? slipped
-                                     : fault == WheelFault::filtered ? filtered
-                                     : fault == WheelFault::sampled  ? of_samples
-                                     : fault == WheelFault::averaged ? average
-                                                                     : place);
+    Eigen::Vector3d read = common * (fault == WheelFault::slipping || fault == WheelFault::slipping_once ? slipped
+                                     : fault == WheelFault::filtered                                     ? filtered
+                                     : fault == WheelFault::sampled                                      ? of_samples
+                                     : fault == WheelFault::averaged                                     ? average
+                                                                                                         : place);
     if (fault == WheelFault::in_a_plane) read.y() = 0.0;
     if (fault != WheelFault::in_a_plane) read = other * read;
     for (double& each : read) each += (fault == WheelFault::noisy ? 0.05 : 0.003) * draws.normal();
@@ -89,6 +91,33 @@ TEST(SensorFaults, FilteredOdometryIsNoLateClock) {
   EXPECT_EQ(averaged.beyond_5_sigma, 0) << " worst " << averaged.worst;
   for (const WheelFault fault : {WheelFault::right, WheelFault::late, WheelFault::slipping, WheelFault::in_a_plane})
     EXPECT_LE(drawn_odometry(fault, 40).filters, 1) << static_cast<int>(fault);
+}
+
+/// For 3 of 20 s by 40 %: it was in the scale.
+TEST(SensorFaults, AStretchOnWhichWheelsSlipIsLeftOut) {
+  int named = 0;
+  Drawn slipping;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const Swaying swaying(seed);
+    const auto read =
+        scale_by_odometry(odometry(swaying, WheelFault::slipping_once, seed), 0.01, swaying.path(duration_s));
+    ASSERT_TRUE(read) << seed;
+    slipping.add(read);
+    if (!(read->slip_ratio > 0.0)) continue;
+    ++named;
+    EXPECT_NEAR(read->slip_from_s, 8.0, 1.0) << seed;
+    EXPECT_NEAR(read->slip_to_s, 11.0, 1.0) << seed;
+    EXPECT_NEAR(read->slip_ratio, 1.4, 0.15) << seed;
+  }
+  EXPECT_GE(named, 25);  // not where the camera hardly moves then
+  EXPECT_EQ(slipping.beyond_5_sigma, 0) << slipping.worst;
+  EXPECT_LE(slipping.beyond_3_sigma, 1);
+  for (const WheelFault fault : {WheelFault::right, WheelFault::late, WheelFault::filtered, WheelFault::noisy})
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      const Swaying swaying(seed);
+      const auto read = scale_by_odometry(odometry(swaying, fault, seed), 0.01, swaying.path(duration_s));
+      if (read) EXPECT_EQ(read->slip_ratio, 0.0) << static_cast<int>(fault) << ", " << seed;
+    }
 }
 
 TEST(SensorFaults, AClockOfOdometryIsFound) {

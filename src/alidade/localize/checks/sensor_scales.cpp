@@ -41,6 +41,9 @@ void take_read(const ReadScale& read, SensorScale& scale) {
   scale.jump_m = read.jump_m;
   scale.jump_s = read.jump_s;
   scale.other_log_scale = read.other_log_scale;
+  scale.slip_from_s = read.slip_from_s;
+  scale.slip_to_s = read.slip_to_s;
+  scale.slip_ratio = read.slip_ratio;
   scale.is_drifting = read.is_drifting;
   scale.drift_m = read.drift_m;
   scale.arm_m = read.arm_m;

@@ -216,7 +216,8 @@ void add_field_faults(const LocalizeConfig& config, Sentences& found) {
   LocalizeConfig copy = config;
   found = faults_of(fields_of(copy));
   for (const Field& field : fields_of(copy))
-    if (const auto* code = std::get_if<TextCode>(&field.value); code != nullptr && !code->words.empty() && code->write().empty())
+    if (const auto* code = std::get_if<TextCode>(&field.value);
+        code != nullptr && !code->words.empty() && code->write().empty())
       found.push_back(fmt::format("{} is none of {}", field.name, form_text(field)));
   for (std::string& fault : faults_of(inner_fields(copy))) found.push_back(std::move(fault));
 }

@@ -42,7 +42,8 @@ void add_window(std::span<const NumberedPose> poses, std::vector<WindowPart>& pa
     }
   }
   const Eigen::MatrixXd speeds = slopes * minimum_norm_solution(powers, x);
-  WindowPart part{poses.data()};
+  WindowPart part;
+  part.first = poses.data();
   part.Q = orthonormal_basis(powers, order + 1);
   for (Eigen::Index c = 0; c < 6; ++c) {
     part.speed = speeds.col(c);

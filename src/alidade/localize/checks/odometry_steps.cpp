@@ -201,7 +201,7 @@ Stretch most_gain(std::span<const Step> in_path, const StepNoise& noise, double 
     if (one.gain > best.gain) best = one;
     return one.gain >= best.gain;
   };
-  for (const std::size_t part : {4, 8, 16, 32}) {
+  for (const std::size_t part : {4u, 8u, 16u, 32u}) {
     const std::size_t length = std::max(num / part, fewest);
     for (std::size_t begin = 0; begin + length <= num; begin += std::max(length / 4, std::size_t{1}))
       look(begin, begin + length);

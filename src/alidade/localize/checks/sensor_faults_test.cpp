@@ -96,6 +96,7 @@ TEST(SensorFaults, FilteredOdometryIsNoLateClock) {
 /// For 3 of 20 s by 40 %: it was in the scale.
 TEST(SensorFaults, AStretchOnWhichWheelsSlipIsLeftOut) {
   int named = 0;
+  double squares = 0.0;
   Drawn slipping;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const Swaying swaying(seed);
@@ -105,11 +106,13 @@ TEST(SensorFaults, AStretchOnWhichWheelsSlipIsLeftOut) {
     slipping.add(read);
     if (!(read->slip_ratio > 0.0)) continue;
     ++named;
+    squares += std::pow(std::log(read->scale), 2);
     EXPECT_NEAR(read->slip_from_s, 8.0, 1.0) << seed;
     EXPECT_NEAR(read->slip_to_s, 11.0, 1.0) << seed;
     EXPECT_NEAR(read->slip_ratio, 1.4, 0.15) << seed;
   }
-  EXPECT_GE(named, 25);  // not where the camera hardly moves then
+  EXPECT_GE(named, 25);                         // not where the camera hardly moves then
+  EXPECT_LT(std::sqrt(squares / named), 0.03);  // 40 % of 3 s in 20 are 6 %; the common scale has 1 % of its own
   EXPECT_EQ(slipping.beyond_5_sigma, 0) << slipping.worst;
   EXPECT_LE(slipping.beyond_3_sigma, 1);
   for (const WheelFault fault : {WheelFault::right, WheelFault::late, WheelFault::filtered, WheelFault::noisy})

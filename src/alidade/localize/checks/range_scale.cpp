@@ -2,12 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
-#include <utility>
+#include <optional>
 
 #include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
-#include "alidade/localize/checks/beam_surfaces.h"
+#include "alidade/localize/checks/beam_scales.h"
 #include "alidade/localize/checks/scale_readings.h"
 
 // A rangefinder's scale: where its beam meets the surface that the map's points lie on.
@@ -16,154 +15,13 @@ namespace alidade {
 
 namespace {
 
-struct BeamScale {
-  double log_scale = 0.0, roughness = 0.0;                 ///< The points off their plane, over the distance.
-  double of_offset = 0.0;                                  ///< ∂scale / ∂(length of all readings). [units/m]
-  Eigen::Vector2d of_direction = Eigen::Vector2d::Zero();  ///< ∂scale / ∂(direction of the beam). [units/rad]
-};
-
-/// Which surface a beam meets.
-enum class SurfaceBy {
-  nearest,  ///< Through the nearest points.
-  around,   ///< Any through points in one plane all around the beam: where one stands before another, which one do the
-            ///< readings say together.
-};
-
-std::vector<BeamSurface> surfaces_of(const Eigen::Vector3d& hit_in_cam, std::span<const Eigen::Vector3d> points_in_cam,
-                                     SurfaceBy by) {
-  const Eigen::Vector3d direction = hit_in_cam.normalized();  // the camera's centre alone has no scale
-  if (by == SurfaceBy::around) return surfaces_around(direction, points_in_cam);
-  const auto surface = nearest_surface(direction, points_in_cam);
-  return surface ? std::vector{*surface} : std::vector<BeamSurface>();
-}
-
-std::optional<BeamScale> scale_on(const BeamSurface& surface, const Beam& beam, double range_m) {
-  constexpr double max_roughness = 0.1, grazing = 0.3;
-  const Eigen::Vector3d hit_in_cam = point_at(beam, range_m);
-  const double to_plane = surface.normal.dot(surface.middle), of_hit = surface.normal.dot(hit_in_cam);
-  const double of_beam = surface.normal.dot(beam.scale * beam.direction_in_cam);
-  const double distance = surface.middle.norm();
-  if (std::abs(of_hit) < grazing * hit_in_cam.norm() || surface.roughness > max_roughness * distance)
-    return std::nullopt;
-  // n·X = c in units; where the beam hits it is s c in metres.
-  const double scale = of_hit / to_plane;
-  if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
-  const Eigen::RowVectorXd of_params = surface.normal.transpose() * J_point_beam(beam, range_m) / to_plane;
-  return BeamScale{std::log(scale), surface.roughness / distance, of_beam / to_plane,
-                   of_params.segment<2>(beam_direction_param).transpose()};
-}
-
-/// Metres a unit where the beam hits a plane through points near it, for each such plane.
-std::vector<BeamScale> scales_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
-                                 std::span<const MapPoint> map, SurfaceBy by) {
-  const Rigid3 cam_from_world = world_from_cam.inverse();
-  std::vector<Eigen::Vector3d> points_in_cam;
-  points_in_cam.reserve(map.size());
-  for (const MapPoint& point : map) points_in_cam.push_back(cam_from_world * point.point_in_world);
-  std::vector<BeamScale> scales;
-  for (const BeamSurface& surface : surfaces_of(point_at(beam, range_m), points_in_cam, by))
-    if (auto scale = scale_on(surface, beam, range_m)) scales.push_back(*scale);
-  return scales;
-}
-
-std::optional<BeamScale> scale_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
-                                  std::span<const MapPoint> map) {
-  const std::vector<BeamScale> scales = scales_at(world_from_cam, beam, range_m, map, SurfaceBy::nearest);
-  return scales.empty() ? std::nullopt : std::optional(scales.front());
-}
-
-/// Of the log of the scale by the beam's parameters: the median over the readings, since a moved beam may hit between
-/// other points.
-BeamVector of_beam_params(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
-                          std::span<const MapPoint> map) {
-  constexpr double step = 1e-5;  // m, rad and shares alike
-  std::array<std::vector<double>, num_beam_params> slopes;
-  for (const RangeReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s);
-    const auto scale = pose ? scale_at(*pose, beam, reading.range_m, map) : std::nullopt;
-    if (!scale) continue;
-    for (int k = 0; k < num_beam_params; ++k) {
-      const auto moved = scale_at(*pose, beam.retract(step * BeamVector::Unit(k)), reading.range_m, map);
-      if (moved) slopes[static_cast<std::size_t>(k)].push_back((moved->log_scale - scale->log_scale) / step);
-    }
-  }
-  BeamVector along = BeamVector::Zero();
-  for (int k = 0; k < num_beam_params; ++k) {
-    std::vector<double>& each = slopes[static_cast<std::size_t>(k)];
-    if (!each.empty()) along[k] = median_of(std::move(each));
-  }
-  return along;
-}
-
-/// σ of the scale by what is not known of the beam: an ordinary 0.5 % of its scale where the file says nothing.
-double sigma_by_beam(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
-                     std::span<const MapPoint> map) {
-  constexpr double ordinary_scale = 0.005;
-  if (!(beam.cov.diagonal().maxCoeff() > 0.0)) return ordinary_scale;
-  const BeamVector along = of_beam_params(readings, beam, path, map);
-  return std::sqrt(std::max(along.dot(beam.cov * along), 0.0));
-}
-
-/// One scale of each reading, and ln of another over it that at least half as many of them have.
-struct AgreeingScales {
-  std::vector<BeamScale> scales;
-  double other_log_scale = 0.0;
-};
-
-/// Of each reading the scale that most of the others have, too: a kernel's mode. None where too few agree: the beam may
-/// have met none of these surfaces, as within a frame of points.
-std::optional<AgreeingScales> agreeing(std::span<const std::vector<BeamScale>> of_readings) {
-  constexpr double width = 0.01, apart = 3.0, half = 0.5, enough = 0.6;
-  const auto nearest = [](const std::vector<BeamScale>& scales, double log_scale) {
-    return *std::ranges::min_element(scales, {},
-                                     [&](const BeamScale& each) { return std::abs(each.log_scale - log_scale); });
-  };
-  std::vector<std::pair<double, double>> supports;  // and scales
-  for (const std::vector<BeamScale>& at : of_readings)
-    for (const BeamScale& one : at) {
-      double sum = 0.0;
-      for (const std::vector<BeamScale>& scales : of_readings)
-        sum += std::exp(-0.5 * std::pow((nearest(scales, one.log_scale).log_scale - one.log_scale) / width, 2));
-      supports.emplace_back(sum, one.log_scale);
-    }
-  std::ranges::sort(supports, std::greater());
-  const auto [most, mode] = supports.front();
-  if (most < enough * static_cast<double>(of_readings.size())) return std::nullopt;
-  AgreeingScales agreeing;
-  for (const std::vector<BeamScale>& scales : of_readings) agreeing.scales.push_back(nearest(scales, mode));
-  for (const auto& [sum, log_scale] : supports)
-    if (agreeing.other_log_scale == 0.0 && sum > half * most && std::abs(log_scale - mode) > apart * width)
-      agreeing.other_log_scale = log_scale - mode;
-  return agreeing;
-}
-
-constexpr std::size_t num_blocks = 10;
-
-/// Of each reading that has a surface its scales, in order of time.
-std::vector<std::vector<BeamScale>> scales_by(SurfaceBy by, std::span<const RangeReading> readings, const Beam& beam,
-                                              std::span<const PathStep> path, std::span<const MapPoint> map) {
-  std::vector<std::vector<BeamScale>> of_readings;
-  for (const RangeReading& reading : readings) {
-    const auto pose = pose_at(path, reading.t_s);
-    if (!pose) continue;
-    auto scales = scales_at(*pose, beam, reading.range_m, map, by);
-    if (!scales.empty()) of_readings.push_back(std::move(scales));
-  }
-  return of_readings;
-}
-
-/// One scale of each reading: by planes all around the beam, where enough have them and agree.
-AgreeingScales scales_of(std::span<const RangeReading> readings, const Beam& beam, std::span<const PathStep> path,
-                         std::span<const MapPoint> map) {
-  constexpr std::size_t enough = 3 * num_blocks;
-  const auto around = scales_by(SurfaceBy::around, readings, beam, path, map);
-  if (around.size() >= enough)
-    if (auto agree = agreeing(around)) return *std::move(agree);
-  AgreeingScales nearest;
-  for (const std::vector<BeamScale>& each : scales_by(SurfaceBy::nearest, readings, beam, path, map))
-    nearest.scales.push_back(each.front());
-  if (nearest.scales.size() < enough) nearest.scales.clear();
-  return nearest;
+/// Those on surfaces that are as smooth as most: around an edge six points are on two of them.
+void reject_rough(std::vector<BeamScale>& scales) {
+  constexpr double rougher = 3.0, smooth = 0.001;
+  std::vector<double> sizes;
+  for (const BeamScale& each : scales) sizes.push_back(each.roughness);
+  const double limit = rougher * std::max(smooth, median_of(std::move(sizes)));
+  std::erase_if(scales, [&](const BeamScale& each) { return each.roughness > limit; });
 }
 
 /// Those near their median.
@@ -195,23 +53,27 @@ MeanScale mean_of_blocks(std::span<const BeamScale> scales) {
   return {mean, std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0))};
 }
 
-/// Something of the beam that is not as given: scale_i = S + x_i · by, with x of a reading the more, the more that
-/// changes its scale.
+/// Something of the beam or its readings that is not as given: scale_i = S + x_i · by, with x of a reading the more,
+/// the more that changes its scale.
 struct BeamFault {
   Eigen::Index num = 1;  ///< Of its numbers.
   Eigen::VectorXd (*x_of)(const BeamScale&);
   double clear, half_clear;  ///< Of T² with nine degrees of freedom: as seldom as 3.5σ and 2σ of a normal distribution.
+  bool is_length = false;  ///< As the shape of a surface is, which is the same from near and far.
 };
 /// All readings are too long by one length.
 const BeamFault offset_fault{
-    1, [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_offset).eval(); }, 28.6, 5.4};
+    1, [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_offset).eval(); }, 28.6, 5.4, true};
 /// The beam points elsewhere.
 const BeamFault direction_fault{2, [](const BeamScale& each) -> Eigen::VectorXd { return each.of_direction; }, 52.3,
                                 10.5};
+/// The readings' clock is late.
+const BeamFault clock_fault{1, [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_time).eval(); },
+                            28.6, 5.4};
 
 struct FaultFit {
-  double scale = 1.0, left2 = 0.0;  ///< What is left over, squared.
-  Eigen::VectorXd by, spread;       ///< Standard deviations of x.
+  double scale = 1.0, left2 = 0.0;   ///< What is left over, squared.
+  Eigen::VectorXd by, mean, spread;  ///< Of x, and its standard deviations.
 };
 
 std::optional<FaultFit> fault_fit(const BeamFault& fault, std::span<const BeamScale> scales, std::size_t but_begin,
@@ -229,9 +91,9 @@ std::optional<FaultFit> fault_fit(const BeamFault& fault, std::span<const BeamSc
     squares += y * y;
   }
   FaultFit fit;
-  const Eigen::VectorXd mean = H.col(0).tail(fault.num) / H(0, 0);
+  fit.mean = H.col(0).tail(fault.num) / H(0, 0);
   const Eigen::VectorXd square = H.diagonal().tail(fault.num) / H(0, 0);
-  fit.spread = (square - mean.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
+  fit.spread = (square - fit.mean.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
   const Ldlt ldlt(H);
   constexpr double hardly = 1e-10;
   if (!(ldlt.min_pivot() > hardly * H(0, 0)) || !(fit.spread.minCoeff() > 0.0)) return std::nullopt;
@@ -266,7 +128,9 @@ std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const Be
   }
   const double share = (static_cast<double>(num_blocks) - 1.0) / static_cast<double>(num_blocks);
   cov = share * cov + of_beam;
-  cov.diagonal() += (of_surface * fit->scale * fit->spread.cwiseInverse()).cwiseAbs2();
+  constexpr double both_ways = 2.0;
+  const Eigen::VectorXd of_x = fault.is_length ? Eigen::VectorXd(fit->mean / both_ways) : fit->spread;
+  cov.diagonal() += (of_surface * fit->scale * of_x.cwiseInverse()).cwiseAbs2();
   found.sigma_log_scale = std::sqrt(share * of_scale);
   found.sigma_by = cov.diagonal().cwiseSqrt();
   found.T2 = fit->by.dot(Ldlt(cov).inverse() * fit->by);
@@ -288,48 +152,108 @@ double hidden_offset(std::span<const BeamScale> scales, const Beam& beam, const 
   return instrument_m * of_offset / scale;
 }
 
-/// Where the readings say that they are all too long, or that the beam points elsewhere, that which explains more is
-/// estimated; where they half say so, its effect is in σ.
-void add_faults(std::span<const BeamScale> scales, const Beam& beam, double of_surface, ReadScale& read) {
+/// The data as they are without a fault of this size.
+struct CorrectedData {
+  std::vector<RangeReading> readings;
+  Beam beam;
+};
+CorrectedData without_fault(const RangeData& data, const BeamFault& fault, const Eigen::VectorXd& by) {
+  CorrectedData corrected{{data.readings.begin(), data.readings.end()}, data.beam};
+  BeamVector step = BeamVector::Zero();
+  if (&fault == &direction_fault) step.segment<2>(beam_direction_param) = -by;
+  corrected.beam = data.beam.retract(step);
+  for (RangeReading& reading : corrected.readings) {
+    if (&fault == &offset_fault) reading.range_m -= by[0];
+    if (&fault == &clock_fault) reading.t_s -= by[0];
+  }
+  return corrected;
+}
+
+/// A fault that the readings show clearly, as large as it explains them best, and how well it then does.
+struct Cause {
+  const BeamFault* fault = nullptr;
+  FoundFault found;
+  Eigen::VectorXd by;
+  double misfit = 0.0;  ///< Robust σ of the scales that are left. [relative]
+};
+
+/// It is linear for small ones only: a beam that points elsewhere meets other surfaces.
+std::optional<Cause> cause_of(const RangeData& data, const BeamFault& fault, FoundFault found,
+                              const Eigen::MatrixXd& of_beam) {
+  constexpr int rounds = 3;
+  constexpr double enough = 0.5;
+  Cause cause{&fault, std::move(found), {}, 0.0};
+  cause.by = cause.found.fit.by;
+  for (int round = 0; round < rounds; ++round) {
+    const CorrectedData corrected = without_fault(data, fault, cause.by);
+    std::vector<BeamScale> scales = scales_of({corrected.readings, corrected.beam, data.path, data.map}).scales;
+    if (static_cast<double>(scales.size()) < enough * static_cast<double>(data.readings.size())) return std::nullopt;
+    std::vector<double> logs, sizes;
+    for (const BeamScale& each : scales) logs.push_back(each.log_scale);
+    const double median = median_of(logs);
+    for (const double log : logs) sizes.push_back(std::abs(log - median));
+    cause.misfit = normal_from_mad * median_of(std::move(sizes));
+    reject_rough(scales);
+    reject_far(scales);
+    if (scales.size() < num_blocks) return std::nullopt;
+    auto again = found_fault(fault, scales, of_beam, 0.0);
+    if (!again) return std::nullopt;
+    cause.by += again->fit.by;
+    cause.found = std::move(*again);
+  }
+  return cause;
+}
+
+/// Where the readings say that they are all too long or late, or that the beam points elsewhere, that which explains
+/// most is estimated; where they half say so, its effect is in σ.
+void add_faults(const RangeData& data, std::span<const BeamScale> scales, double of_surface, ReadScale& read) {
+  const Beam& beam = data.beam;
   const Eigen::Vector3d along = beam.direction_in_cam;
   const Eigen::MatrixXd along_beam = Eigen::MatrixXd::Constant(1, 1, along.dot(beam.cov.topLeftCorner<3, 3>() * along)),
-                        of_direction = beam.cov.block<2, 2>(beam_direction_param, beam_direction_param);
+                        of_direction = beam.cov.block<2, 2>(beam_direction_param, beam_direction_param),
+                        of_clock = Eigen::MatrixXd::Zero(1, 1);
   const auto offset = found_fault(offset_fault, scales, along_beam, of_surface),
-             direction = found_fault(direction_fault, scales, of_direction, of_surface);
-  const bool is_offset = offset && offset->T2 > offset_fault.clear,
-             is_direction = direction && direction->T2 > direction_fault.clear;
-  const bool is_more_direction = is_direction && (!is_offset || direction->fit.left2 < offset->fit.left2);
-  const auto put = [&](const FoundFault& found) {
-    read.scale = found.fit.scale;
-    read.sigma_rel = std::hypot(read.sigma_rel, found.sigma_log_scale);
+             direction = found_fault(direction_fault, scales, of_direction, of_surface),
+             clock = found_fault(clock_fault, scales, of_clock, of_surface);
+  std::optional<Cause> best;
+  const auto compare = [&](const BeamFault& fault, const std::optional<FoundFault>& found, const auto& of_beam) {
+    if (!found || !(found->T2 > fault.clear)) return;
+    auto cause = cause_of(data, fault, *found, of_beam);
+    if (cause && (!best || cause->misfit < best->misfit)) best = std::move(cause);
   };
+  compare(offset_fault, offset, along_beam);
+  compare(direction_fault, direction, of_direction);
+  compare(clock_fault, clock, of_clock);
+  if (best) {
+    read.scale = best->found.fit.scale;
+    read.sigma_rel = std::hypot(read.sigma_rel, best->found.sigma_log_scale);
+    if (best->fault == &offset_fault) read.offset_m = best->by[0];
+    if (best->fault == &direction_fault) read.aside_rad = best->by.norm();
+    if (best->fault == &clock_fault) read.late_s = best->by[0];
+    return;
+  }
   const double before = read.scale;
   const auto doubt = [&](const std::optional<FoundFault>& found, const BeamFault& fault, double believed) {
     if (found && found->T2 > fault.half_clear)
       read.sigma_rel = std::hypot(read.sigma_rel, believed * std::log(found->fit.scale / before));
   };
-  if (is_more_direction) {
-    put(*direction);
-    read.aside_rad = direction->fit.by.norm();
-  } else if (is_offset) {
-    put(*offset);
-    read.offset_m = offset->fit.by[0];
-  } else {
-    // Where hardly anything determines an offset, what an instrument has is surer.
-    const double known = offset ? std::pow(offset->sigma_by[0] / instrument_m, 2) : 0.0;
-    doubt(offset, offset_fault, 1.0 / (1.0 + known));
-    doubt(direction, direction_fault, 1.0);
-    read.hidden_offset_rel = hidden_offset(scales, beam, offset, before);
-  }
+  // Where hardly anything determines an offset, what an instrument has is surer.
+  const double known = offset ? std::pow(offset->sigma_by[0] / instrument_m, 2) : 0.0;
+  doubt(offset, offset_fault, 1.0 / (1.0 + known));
+  doubt(direction, direction_fault, 1.0);
+  doubt(clock, clock_fault, 1.0);
+  read.hidden_offset_rel = hidden_offset(scales, beam, offset, before);
 }
 
 }  // namespace
 
 std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                         std::span<const PathStep> path, std::span<const MapPoint> map) {
-  auto [scales, other_log_scale] = scales_of(readings, beam, path, map);
+  const RangeData data{readings, beam, path, map};
+  auto [scales, other_log_scale] = scales_of(data);
   if (scales.empty()) return std::nullopt;
   const std::size_t num_given = scales.size();
+  reject_rough(scales);
   reject_far(scales);
   if (scales.size() < num_blocks) return std::nullopt;
   double roughness = 0.0;
@@ -337,9 +261,9 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   const MeanScale mean = mean_of_blocks(scales);
   ReadScale read{std::exp(mean.log_scale), 0.0, scales.size(), num_given - scales.size()};
   // A curved surface is on one side of every plane through its points, by about as much as they are off it.
-  read.sigma_rel = std::hypot(mean.sigma, sigma_by_beam(readings, beam, path, map), roughness);
+  read.sigma_rel = std::hypot(mean.sigma, sigma_by_beam(data), roughness);
   read.other_log_scale = other_log_scale;
-  add_faults(scales, beam, roughness, read);
+  add_faults(data, scales, roughness, read);
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }

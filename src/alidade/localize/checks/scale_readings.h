@@ -72,10 +72,11 @@ struct DepthArm {
                                                       std::span<const PathStep> path, const DepthArm& arm = {});
 
 /// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
-/// readings near their median, with the scatter of blocks of them as its σ. Where their distances say so, all of them
-/// are too long by one length, or where their places say so the beam points elsewhere: then that is estimated, too.
-/// None: too few readings with points around them. Of two surfaces one behind the other that is met which gives most
-/// readings one scale. σ of the beam is in it; where its file has none, 0.5 % of its scale.
+/// readings near their median, with the scatter of blocks of them as its σ. Where a score test says clearly that all of
+/// them are too long by one length, that their clock is late or that the beam points elsewhere, that of these without
+/// which they agree best is estimated, too. Readings where points are off their plane do not count where most are on
+/// it. None: too few readings with points around them. Of two surfaces one behind the other that is met which gives
+/// most readings one scale. σ of the beam is in it; where its file has none, 0.5 % of its scale.
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 

@@ -284,5 +284,18 @@ TEST(SensorFaults, ABeamThatPointsElsewhereIsFoundAndNoOther) {
   }
 }
 
+/// Readings that are 0.3 s late were another direction of the beam, or nothing.
+TEST(SensorFaults, ALateClockOfARangefinderIsFound) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Swaying swaying(seed);
+    swaying.turning_rad = 0.25;
+    WallReadings wall = wall_readings(swaying, false, 0.0, seed);
+    const std::vector<PathStep> path = swaying.path(duration_s);
+    EXPECT_EQ(scale_by_range(wall.readings, beam_aside(), path, wall.map)->late_s, 0.0) << seed;
+    for (RangeReading& reading : wall.readings) reading.t_s += 0.3;
+    EXPECT_NEAR(scale_by_range(wall.readings, beam_aside(), path, wall.map)->late_s, 0.3, 0.05) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -70,7 +70,7 @@ struct DepthFit {
 /// By the readings that are near the others; these are left in `rows`. None: too few.
 [[nodiscard]] std::optional<DepthFit> fitted_without_far(const DepthModel& model, std::vector<DepthRow>& rows);
 
-/// The model with an arm of which nothing is known,  begun where a linear fit that leaves all of g aᵀ free has it.
+/// The model with an arm of which nothing is known, begun where a linear fit that leaves all of g aᵀ free has it.
 [[nodiscard]] DepthModel with_free_arm(DepthModel model, std::span<const DepthRow> rows);
 
 /// How much less than their number they determine whose neighbours are alike: an autoregression of first order.

@@ -15,23 +15,56 @@ namespace {
 struct Harmonic {
   double power = 0.0, cosine = 0.0, sine = 0.0;
 };
-Harmonic harmonic_of(const std::vector<Eigen::Vector3d>& late, double hz) {  // (t, e, weight)
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  double sum = 0.0, sum_e = 0.0, sum_ee = 0.0;
-  for (const Eigen::Vector3d& each : late) {
-    const double phase = 2.0 * std::numbers::pi * hz * each[0];
-    const Eigen::Vector3d row(1.0, std::cos(phase), std::sin(phase));
-    normal += each[2] * row * row.transpose();
-    right += each[2] * each[1] * row;
-    sum += each[2];
-    sum_e += each[2] * each[1];
-    sum_ee += each[2] * each[1] * each[1];
+/// It at frequencies in even steps. Phases are turned on from step to step, and computed anew so often that rounding
+/// stays at 10⁻¹⁴.
+class HarmonicSweep {
+ public:
+  HarmonicSweep(const std::vector<Eigen::Vector3d>& late, double step_hz) {  // (t, e, weight)
+    const auto num = static_cast<Eigen::Index>(late.size());
+    const Eigen::ArrayXXd rows = Eigen::Map<const Eigen::Array3Xd>(late.front().data(), 3, num).transpose();
+    t_s_ = rows.col(0);
+    weight_ = rows.col(2);
+    weighted_ = weight_ * rows.col(1);
+    turn_cos_ = phases(step_hz).cos();
+    turn_sin_ = phases(step_hz).sin();
+    sum_ = weight_.sum();
+    sum_e_ = weighted_.sum();
+    sum_ee_ = (weighted_ * rows.col(1)).sum();
   }
-  const Eigen::Vector3d x = solve_symmetric(normal, right);
-  const double before = sum_ee - sum_e * sum_e / sum, after = sum_ee - x.dot(right);
-  return {before / std::max(after, 1e-12) - 1.0, x[1], x[2]};
-}
+  [[nodiscard]] Harmonic at(double hz) {
+    cos_ = phases(hz).cos();
+    sin_ = phases(hz).sin();
+    since_ = 0;
+    return here();
+  }
+  /// A step after the one before, which is at `hz`.
+  [[nodiscard]] Harmonic next(double hz) {
+    constexpr int most = 64;
+    if (++since_ == most) return at(hz);
+    turned_ = cos_ * turn_cos_ - sin_ * turn_sin_;
+    sin_ = sin_ * turn_cos_ + cos_ * turn_sin_;
+    cos_.swap(turned_);
+    return here();
+  }
+
+ private:
+  [[nodiscard]] Eigen::ArrayXd phases(double hz) const { return 2.0 * std::numbers::pi * hz * t_s_; }
+  [[nodiscard]] Harmonic here() const {
+    const double c = (weight_ * cos_).sum(), s = (weight_ * sin_).sum(), cs = (weight_ * cos_ * sin_).sum();
+    const double cc = (weight_ * cos_.square()).sum(), ss = (weight_ * sin_.square()).sum();
+    Eigen::Matrix3d normal;
+    normal << sum_, c, s, c, cc, cs, s, cs, ss;
+    const Eigen::Vector3d right(sum_e_, (weighted_ * cos_).sum(), (weighted_ * sin_).sum());
+    const Eigen::Vector3d x = solve_symmetric(normal, right);
+    const double before = sum_ee_ - sum_e_ * sum_e_ / sum_, after = sum_ee_ - x.dot(right);
+    return {before / std::max(after, 1e-12) - 1.0, x[1], x[2]};
+  }
+
+  Eigen::ArrayXd t_s_, weight_, weighted_;  ///< `weighted_`: e by its weight.
+  Eigen::ArrayXd turn_cos_, turn_sin_, cos_, sin_, turned_;
+  double sum_ = 0.0, sum_e_ = 0.0, sum_ee_ = 0.0;
+  int since_ = 0;
+};
 
 /// Squares that a sawtooth of this period and phase leaves of the times by which readings are late.
 double sawtooth_cost(const std::vector<Eigen::Vector3d>& late, double period, double phase) {
@@ -103,15 +136,16 @@ std::optional<EncoderSampling> found_sampling(const AxisReadings& readings) {
   if (late.size() < least) return std::nullopt;
   const double step_hz = 0.2 / (late.back()[0] - late.front()[0] + 1.0);
   double best = 0.0, best_hz = 0.0;
+  HarmonicSweep sweep(late, step_hz);
   for (double hz = slowest_hz; hz < fastest_hz; hz += step_hz) {
-    const double power = harmonic_of(late, hz).power;
+    const double power = (hz == slowest_hz ? sweep.at(hz) : sweep.next(hz)).power;
     if (power > best) {
       best = power;
       best_hz = hz;
     }
   }
   if (best < min_gain) return std::nullopt;
-  const Harmonic found = harmonic_of(late, best_hz);
+  const Harmonic found = sweep.at(best_hz);
   const double amplitude = std::hypot(found.cosine, found.sine) * std::numbers::pi * best_hz;  // 1 of a full sawtooth
   if (amplitude < 0.5 || amplitude > 1.6) return std::nullopt;
   double cost = 1e300;

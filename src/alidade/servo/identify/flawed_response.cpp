@@ -38,9 +38,15 @@ class FlawedServo {
       : fit_(fit),
         flaws_(flaws),
         is_limited_(flaws.max_rate_rad_s > 0.0 || flaws.max_acceleration_rad_s2 > 0.0),
+        is_plain_(!is_limited_ && !(flaws.second_tau_s > 0.0) && !(flaws.soft_max_rate_rad_s > 0.0) &&
+                  !(flaws.resonance_hz > 0.0)),
         max_command_(max_command),
-        decays_(fit.params[ServoParam::tau]),
-        lagged_(goal_of(first_command, 0.0)) {
+        gain_(fit.params[ServoParam::gain]),
+        tau_s_(fit.params[ServoParam::tau]),
+        decays_(tau_s_),
+        command_(first_command),
+        goal_(goal_of(first_command, 0.0)),
+        lagged_(goal_) {
     const double max_rate = flaws.max_rate_rad_s > 0.0 ? flaws.max_rate_rad_s : no_limit;
     if (fit.kind == ServoKind::angle) {
       AnglePlant plant{fit.params[ServoParam::gain], AngleUnit::rad, fit.params[ServoParam::tau]};
@@ -65,8 +71,17 @@ class FlawedServo {
   /// `share`: of the log's length, where this is.
   void advance(double dt_s, double command, double share) {
     if (!(dt_s > 0.0)) return;
-    const double goal = goal_of(command, share), lag_s = flaws_.second_tau_s;
+    if (command != command_ || flaws_.gain_drift != 0.0) {
+      command_ = command;
+      goal_ = goal_of(command, share);
+    }
+    const double goal = goal_, lag_s = flaws_.second_tau_s;
     turned_ += flaws_.rate_offset_rad_s * dt_s;
+    if (is_plain_) {
+      move_unlimited(dt_s, goal);
+      read();
+      return;
+    }
     if (!(lag_s > 0.0)) {
       move(dt_s, goal);
       return;
@@ -118,12 +133,12 @@ class FlawedServo {
       return;
     }
     const auto [step_s, decay, rise] = decays_.over(dt_s);
-    const double goal = fit_.params[ServoParam::gain] * command;
+    const double goal = gain_ * command;
     if (fit_.kind == ServoKind::angle) {
       now_.angle_rad = goal + decay * (now_.angle_rad - goal);
     } else {
       const double gap = now_.rate_rad_s - goal;
-      now_.angle_rad += goal * dt_s + gap * fit_.params[ServoParam::tau] * rise;
+      now_.angle_rad += goal * dt_s + gap * tau_s_ * rise;
       now_.rate_rad_s = goal + decay * gap;
     }
   }
@@ -195,11 +210,14 @@ class FlawedServo {
   const ServoFit& fit_;
   const ServoFlaws& flaws_;
   bool is_limited_;
+  bool is_plain_;  ///< A step is one in closed form.
   double max_command_;
+  double gain_, tau_s_;
   Decay decays_;
   ServoAxis axis_;
   AxisMotion now_;
   std::optional<Resonance> swinging_;
+  double command_, goal_;  ///< That acts now, and what an axis of the stated gain would have to follow.
   double lagged_, read_ = 0.0, turned_ = 0.0;
 };
 

@@ -60,7 +60,7 @@ Coverage coverage_of(double colour, bool is_chirp, int num_runs) {
 }
 
 TEST(IdentifyClusters, SigmaHoldsForWhiteNoise) {
-  constexpr int num_runs = 40;
+  constexpr int num_runs = 24;
   for (const bool is_chirp : {false, true}) {
     const Coverage coverage = coverage_of(0.0, is_chirp, num_runs);
     EXPECT_NEAR(coverage.two, 0.954, 0.041);

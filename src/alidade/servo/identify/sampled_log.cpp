@@ -129,6 +129,7 @@ bool is_reading(std::span<const ServoSample> log, std::size_t row) {
 
 std::vector<double> reading_times(std::span<const ServoSample> log) {
   std::vector<double> times_s;
+  times_s.reserve(log.size());
   for (std::size_t i = 0; i < log.size(); ++i)
     if (is_reading(log, i)) times_s.push_back(log[i].read_s());
   return times_s;
@@ -136,6 +137,7 @@ std::vector<double> reading_times(std::span<const ServoSample> log) {
 
 Eigen::VectorXd readings_of(std::span<const ServoSample> log) {
   std::vector<double> angles;
+  angles.reserve(log.size());
   for (std::size_t i = 0; i < log.size(); ++i)
     if (is_reading(log, i)) angles.push_back(log[i].angle_rad);
   return Eigen::Map<const Eigen::VectorXd>(angles.data(), static_cast<Eigen::Index>(angles.size()));

@@ -18,18 +18,24 @@ LIMIT = 5.0  # σ
 
 
 class Audit(unittest.TestCase):
+    #: Words of a run: its result and its folder. Tests that ask different things of one run share it.
+    runs, kept = {}, tempfile.TemporaryDirectory()
+
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
     def run_alidade(self, *words):
-        """The result of a run: None where it was refused or its input was not understood."""
-        out = self.folder / "out"
-        run = subprocess.run([alidade, *map(str, words), "--out", out, "--no-report", "--quiet"], capture_output=True,
-                             text=True)
-        self.assertIn(run.returncode, (0, 3, 4, 5, 6), run.stderr)
-        return json.loads((out / "result.json").read_text()) if run.returncode in (0, 6) else None
+        """The result of a run: None where it was refused or its input was not understood. Its folder is self.out."""
+        words = tuple(map(str, words))
+        if words not in self.runs:
+            out = pathlib.Path(self.kept.name) / str(len(self.runs))
+            run = subprocess.run([alidade, *words, "--out", out, "--no-report", "--quiet"], capture_output=True, text=True)
+            self.assertIn(run.returncode, (0, 3, 4, 5, 6), run.stderr)
+            self.runs[words] = (json.loads((out / "result.json").read_text()) if run.returncode in (0, 6) else None, out)
+        result, self.out = self.runs[words]
+        return result
 
     def is_silent(self, result, errors_in_sigmas):
         """Whether a good verdict stands over an answer that is off: what must not be."""
@@ -95,7 +101,7 @@ class Rangefinder(Audit):
         self.assertLess(max(self.errors(result)), LIMIT)
         self.assertNotEqual(result["verdict"]["state"], "good")
         beam = self.folder / "beam.yaml"
-        beam.write_text((self.folder / "out" / "rangefinder.yaml").read_text())
+        beam.write_text((self.out / "rangefinder.yaml").read_text())
         for range_m in (1.0, 2.0, 4.0):
             seen = self.run_alidade("project", "--beam", beam, "--camera", camera, "--range", range_m)
             point = [o + range_m * d for o, d in zip(self.ORIGIN, self.DIRECTION)]
@@ -155,7 +161,7 @@ class Track(Audit):
     LATE = AUDIT / "track-latency"
 
     def last_row(self):
-        with open(self.folder / "out" / "track.csv") as file:
+        with open(self.out / "track.csv") as file:
             return {name: float(value) for name, value in list(csv.DictReader(file))[-1].items()
                     if name[:2] in ("t_", "x_", "y_", "z_", "vx", "vy", "vz", "si")}
 
@@ -218,7 +224,7 @@ class Localize(Audit):
                 t, *pose = map(float, line.split())
                 truth[round(t, 4)] = pose
         axes = ("x", "y", "z", "rx", "ry", "rz")
-        with open(self.folder / "out" / "poses.csv") as file:
+        with open(self.out / "poses.csv") as file:
             for row in csv.DictReader(file):
                 if not row["x_m"]:
                     continue

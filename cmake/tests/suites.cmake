@@ -3,6 +3,8 @@
 # saved for each of them. Those with parameters are the long ones: one test each, and first, as alone at the end they
 # would leave cores idle.
 set(waiting_suites "^(HeadCommand|Heads)$") # for devices that take their time: they begin first, and the others work beside them
+# Ten seconds of a processor and more: begun late, one of them would be alone at the end.
+set(long_suites "^(ServoCauses|IdentifyClusters|Localize|LoopClosure|SensorScale|LocalizeImu|SimpleCase|LensKind|LongWalk|DepthScale|SensorFaults|LocalizeImages|LocalizeImageFolders|Live|MovingTarget|MovingTargetCommand|TrackFaults|ConsideredErrors|ObserveCauses|ObserveSigma|ObserveDegenerate|ObservePhotos|ZoomingLog|RigTable|Rig|Turned|RenderedWalk|HeadCalibrate|RangefinderCommand)$")
 set(none_ran "Running 0 tests from") # a filter that no test passes is no success
 foreach(executable label IN ZIP_LISTS executables labels)
   get_filename_component(name ${executable} NAME)
@@ -32,6 +34,8 @@ foreach(executable label IN ZIP_LISTS executables labels)
         set(cost ${count})
         if(suite MATCHES "${waiting_suites}")
           set(cost 900)
+        elseif(suite MATCHES "${long_suites}")
+          set(cost 500)
         endif()
         add_test(${label}.${suite} ${executable} "--gtest_filter=${suite}.*")
         set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST ${cost}

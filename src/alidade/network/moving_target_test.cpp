@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -207,10 +208,21 @@ TEST(MovingTarget, FalseLabelsAreFound) {
   EXPECT_LT(sum / num, 1.8);  // of 48 numbers, a σ of 0.2 where all are apart
 }
 
+/// The first half of them.
+Scene brief(Scene scene) {
+  const auto by_time = [](const TargetObservation& a, const TargetObservation& b) {
+    return a.t_capture_s < b.t_capture_s;
+  };
+  const auto [first, last] = std::ranges::minmax_element(scene.observations, by_time);
+  const double until_s = 0.5 * (first->t_capture_s + last->t_capture_s);
+  std::erase_if(scene.observations, [&](const TargetObservation& seen) { return seen.t_capture_s > until_s; });
+  return scene;
+}
+
 TEST(MovingTarget, TheCameraThatIsWrongIsNamed) {
   const auto num_scenes = static_cast<unsigned>(testing::trials(1));
   for (unsigned seed = 31; seed < 31 + num_scenes; ++seed) {
-    const Scene scene = scene_of(loops, seed, false);
+    const Scene scene = brief(scene_of(loops, seed, false));
     const MovingTargetConfig config{.distance = true_distance(scene)};
     const auto sentence = [&](const Scene& other, const std::vector<RigHead>& heads) {
       const Verdict verdict = moving_target_verdict(place_cameras(other.observations, heads, config), config);

@@ -1,13 +1,12 @@
 // What a page says first, and that no figure says more, or less, than the document behind it.
 import assert from 'node:assert/strict';
 import {base} from './documents.mjs';
-import {settled} from './page.mjs';
 
 /** A window of a laptop: the verdict, the values, one figure and the next step, without scrolling. */
 async function theFirstScreenAnswers({open, urlOf, documents}) {
   for (const name of Object.keys(documents)) {
     const {page, close} = await open(urlOf(name), {width: 1280, height: 800});
-    await settled(page);
+    await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 20)))); // what is below is drawn in a test of its own
     const found = await page.evaluate(() => ({next: document.querySelector('header .to-do')?.textContent ?? '', header: document.querySelector('header').getBoundingClientRect().bottom,
       first: [...document.querySelectorAll('.card.first')].map((card) => ({id: card.id, top: card.getBoundingClientRect().top, bottom: card.getBoundingClientRect().bottom})), cards: document.querySelectorAll('main > .card').length}));
     await close();

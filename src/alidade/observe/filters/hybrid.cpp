@@ -12,11 +12,12 @@ namespace {
 constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
 constexpr int slip_patience = 15;   // frames until a point that slipped is met again
 constexpr double slipped_variance = 25.0;
-constexpr double restart_after_s = 1.0;  // without a frame that fits
-constexpr double better_by = 9.2;        // χ²₂ at 0.01
-constexpr int drift_window = 15;         // frames
-constexpr double finer_by = 0.75;        // of σ: what the filter gained since the last adjustment, before the next
-constexpr int between_adjustments = 5;   // frames
+constexpr double restart_after_s = 1.0;  // of frames that do not fit; a gap before them is none
+constexpr double longest_step_s = 0.25;
+constexpr double better_by = 9.2;       // χ²₂ at 0.01
+constexpr int drift_window = 15;        // frames
+constexpr double finer_by = 0.75;       // of σ: what the filter gained since the last adjustment, before the next
+constexpr int between_adjustments = 5;  // frames
 
 }  // namespace
 
@@ -56,8 +57,10 @@ IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
     estimate.event = ObserveEvent::new_segment;
   }
   rejected_step_.setZero();
-  if (is_running_) filter_frame(frame, estimate);
-  if (!is_running_) bootstrap(frame, estimate);
+  const bool sees = std::ranges::any_of(px_, is_seen);
+  if (is_running_ && sees) filter_frame(frame, estimate);
+  if (is_running_ && !sees && has_fit_) last_fit_s_ = frame.t_s;  // such a frame says nothing of the camera
+  if (!is_running_ && sees) bootstrap(frame, estimate);
   if (is_running_) report(frame.t_s, estimate);
   return estimate;
 }
@@ -71,6 +74,7 @@ void HybridObserver::bootstrap(const RotationFrame& frame, IntrinsicsEstimate& e
   if (!adjust_buffer()) return;
   is_running_ = true;
   last_fit_s_ = drift_from_s_ = frame.t_s;
+  has_fit_ = true;
   constant_since_s_ = buffer_.frames().front().t_s;
   estimate.event = ObserveEvent::start;
 }
@@ -131,11 +135,12 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
   estimate.nis_dof = judgement.dof;
   estimate.point = judgement.point;
   if (estimate.event == ObserveEvent::none) estimate.event = judgement.event;
+  note_fit(frame.t_s, judgement.accept);
   if (!judgement.accept) {
     // An outlier, or the first frame of another camera: the next one will tell.
     const CommonVector step = filter_.with_added_variance(process_noise(filter_, any_zoom)).step;
     if (!config_.no_zoom && step.allFinite()) rejected_step_ = step.head<4>();
-    if (frame.t_s - last_fit_s_ > restart_after_s) restart(estimate);
+    if (frame.t_s - unfit_since_s_ > restart_after_s) restart(estimate);
     return;
   }
   has_candidate_ = false;
@@ -153,6 +158,11 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     begin_settling();
     estimate.event = ObserveEvent::zoom_end;
   }
+}
+
+void HybridObserver::note_fit(double t_s, bool fits) {
+  if (has_fit_ && !fits) unfit_since_s_ = std::max(last_fit_s_, t_s - longest_step_s);
+  has_fit_ = fits;
 }
 
 /// The intrinsics' scores of some frames together: a slow change that no single frame shows. Where leaving one point

@@ -70,6 +70,7 @@ class HybridObserver {
   void bootstrap(const RotationFrame& frame, IntrinsicsEstimate& estimate);
   bool adjust_buffer();
   void filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate);
+  void note_fit(double t_s, bool fits);
   [[nodiscard]] Judgement judge();
   bool reject_until(double gate_z, Judgement& judgement);
   [[nodiscard]] bool is_zoom(const RotationFrame& frame);
@@ -117,6 +118,8 @@ class HybridObserver {
   double sigma_px_ = 0.0;  ///< Normalised.
   double next_adjustment_s_ = 0.0;
   double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
+  bool has_fit_ = true;         ///< The last frame with pixels; otherwise none has
+  double unfit_since_s_ = 0.0;  ///< since then.
   double drift_from_s_ = 0.0;  ///< The last frame before those whose scores are being added: a zoom may begin after it.
   Eigen::Vector4d rejected_step_ = Eigen::Vector4d::Zero();  ///< Of fx, fy, cx, cy, as a rejected frame asks for it.
   std::vector<ConstantSpan> constant_spans_;                 ///< Before the intrinsics last changed.

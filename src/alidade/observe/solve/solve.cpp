@@ -64,10 +64,22 @@ bool has_zoom(const ObserveSolution& report) {
   });
 }
 
-/// Of the pixels that it is of.
-double rejected_share(const ObserveSolution& report) {
-  const auto out = static_cast<double>(report.pixels_rejected);
-  return out / std::max(1.0, out + static_cast<double>(report.reference.bundle.observations.size()));
+/// Of the pixels that it is of, in rows that the filter took in: what no camera explains says nothing of zooms.
+double rejected_share(const ObserveSolution& solution, const RotationLog& log,
+                      const std::vector<IntrinsicsEstimate>& filtered) {
+  const RotationBundle& bundle = solution.reference.bundle;
+  std::vector<double> kept(bundle.frames.size(), 0.0);
+  for (const BundleObservation& seen : bundle.observations) kept[static_cast<std::size_t>(seen.frame)] += 1.0;
+  double all = 0.0, out = 0.0;
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const auto row = std::ranges::lower_bound(log.rows, bundle.frames[k].t_s - 1e-9, {}, &RotationRow::t_s);
+    const IntrinsicsEstimate& estimate = filtered[static_cast<std::size_t>(row - log.rows.begin())];
+    if (!estimate.has_value || estimate.event == ObserveEvent::burst) continue;
+    const auto num = static_cast<double>(std::ranges::count_if(row->px, is_seen));
+    all += num;
+    out += num - kept[k];
+  }
+  return out / std::max(1.0, all);
 }
 
 /// Whether one of what all rows ask for most, once it is estimated, leaves no more noise than this.
@@ -130,7 +142,8 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
     report.mounting_step = step_instead(log, config, report, progress);
     return;
   }
-  const bool rejects_rows = rejected_share(all) > rejected_share(report) + more;
+  const auto rejected = [&](const ObserveSolution& each) { return rejected_share(each, log, report.steps); };
+  const bool rejects_rows = rejected(all) > rejected(report) + more;
   if ((all.sigma_px < nearly * report.sigma_px && !rejects_rows) || config.no_zoom) {
     const IntrinsicsEstimate last = all.steps.back();
     all.steps = std::move(report.steps);

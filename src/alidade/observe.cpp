@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "alidade/observe/checks/frame_places.h"
+#include "alidade/observe/checks/standing_rows.h"
 #include "alidade/observe/solve/solve.h"
 #include "alidade/observe/solve/solve_once.h"
 
@@ -107,6 +108,23 @@ void heed_places(const ObserveSetup& setup, const Progress& progress, RotationLo
   log = std::move(moved);
 }
 
+/// Rows of a camera that stands and err alike count once.
+void heed_stops(const ObserveSetup& setup, const Progress& progress, RotationLog& log, ObserveSolution& solution) {
+  constexpr double mostly = 0.5, most_own = 0.7;
+  constexpr std::size_t fewest = 3;
+  const StandingRows standing = standing_rows(log);
+  if (standing.stops.size() < fewest) return;
+  const bool may_share = num_zooms(solution) > 0 || solution.status != ObserveSolution::Status::ok ||
+                         standing.sigma_within_px < most_own * solution.sigma_px;
+  if (!may_share) return;
+  RotationLog once = with_each_stop_once(log, standing);
+  ObserveSolution again = solve_intrinsics(once, setup, progress);
+  if (again.status != ObserveSolution::Status::ok || shared_within_stops(again, log, standing) < mostly) return;
+  again.side_checks.push_back(standing_check(again, standing));
+  solution = std::move(again);
+  log = std::move(once);
+}
+
 }  // namespace
 
 ObserveReport observe(RotationLog log, const ObserveConfig& config, const Progress& progress) {
@@ -121,7 +139,10 @@ ObserveReport observe(RotationLog log, const ObserveConfig& config, const Progre
     for (RotationRow& row : log.rows) undistort(*setup.camera, Eigen::Vector2d::Constant(not_seen), row.px);
   }
   ObserveSolution solution = solve_intrinsics(log, setup, progress);
-  if (setup.rotation == RotationKnowledge::known) heed_places(setup, progress, log, solution);
+  if (setup.rotation == RotationKnowledge::known) {
+    heed_places(setup, progress, log, solution);
+    heed_stops(setup, progress, log, solution);
+  }
   return judged_observation(std::move(solution), std::move(log), setup);
 }
 

@@ -35,17 +35,18 @@ struct Mean {
 
 constexpr int num_sequences = 40;
 
-Mean protocol(double sigma_depth, DistortionVariant variant, FeatureKind kind, const LocalizationFilterConfig& filter) {
+Mean protocol(double sigma_depth, DistortionVariant variant, FeatureKind kind, const LocalizationFilterConfig& filter,
+              int num = num_sequences) {
   Mean mean;
-  for (int seed = 0; seed < num_sequences; ++seed) {
+  for (int seed = 0; seed < num; ++seed) {
     const UnderwaterSample sample =
         testing::underwater_sample(scene_of(sigma_depth), 7000 + static_cast<std::uint64_t>(seed));
     const auto run = testing::run_protocol(sample, *with_distortion(sample.camera, variant), filter, {}, kind);
-    mean.p1 += run.p1_mean / num_sequences;
-    mean.p5 += run.p5_mean / num_sequences;
-    mean.p1_nees += run.p1_nees / num_sequences;
-    mean.p5_nees += run.p5_nees / num_sequences;
-    mean.p1_above_2 += run.p1_above_2 / num_sequences;
+    mean.p1 += run.p1_mean / num;
+    mean.p5 += run.p5_mean / num;
+    mean.p1_nees += run.p1_nees / num;
+    mean.p5_nees += run.p5_nees / num;
+    mean.p1_above_2 += run.p1_above_2 / num;
     mean.worst_p1 = std::max(mean.worst_p1, run.p1_last);
     mean.num_diverged += run.worst_last < 2.0 ? 0 : 1;
   }
@@ -63,8 +64,9 @@ TEST(Localize, KnowingTheLensMakesTheMapAsGoodAsItsCovarianceSays) {
   EXPECT_LT(full.p1_nees, 1.8);
   EXPECT_GT(full.p5_nees, 0.5);
   EXPECT_LT(full.p5_nees, 1.8);
-  const Mean first = protocol(0.03, DistortionVariant::radial1, FeatureKind::xyz, filter);
-  const Mean pinhole = protocol(0.03, DistortionVariant::none, FeatureKind::xyz, filter);
+  constexpr int few = num_sequences / 2;  // a wrong lens' errors are alike in all of them
+  const Mean first = protocol(0.03, DistortionVariant::radial1, FeatureKind::xyz, filter, few);
+  const Mean pinhole = protocol(0.03, DistortionVariant::none, FeatureKind::xyz, filter, few);
   EXPECT_GT(pinhole.p1 / full.p1, 4.5);
   EXPECT_GT(first.p1 / full.p1, 1.8);
   EXPECT_GT(pinhole.p1_above_2, 0.35);
@@ -264,7 +266,7 @@ TEST(Localize, AWrongPathIsNeverGood) {
   EXPECT_EQ(verdict_of(sample.camera, sample.config).state, State::good);
   const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
   EXPECT_GE(verdict_of(*pinhole, sample.config).state, State::care);
-  constexpr std::size_t num_frames = 25;  // what contradicts itself begins again in most frames: that takes its time
+  constexpr std::size_t num_frames = 15;  // what contradicts itself begins again in most frames: that takes its time
   sample.frames.resize(num_frames);
   sample.truth.resize(num_frames);
   LocalizeConfig sure = sample.config;
@@ -326,7 +328,7 @@ std::pair<double, double> nees_and_rms_m(const Localization& report, const Under
 
 TEST(Localize, SeesThroughAFlatPort) {
   double nees = 0.0, rms_m = 0.0;
-  constexpr int num_seeds = 6;
+  constexpr int num_seeds = 6, num_thin = 2;
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     UnderwaterScene scene = rich_scene();
     scene.camera = camera_behind_port();
@@ -338,6 +340,7 @@ TEST(Localize, SeesThroughAFlatPort) {
     nees += nees_here / num_seeds;
     rms_m += rms_here_m / num_seeds;
     // The same lens with its port pressed against it: as the paper's.
+    if (seed > num_thin) continue;
     Camera thin = sample.camera;
     std::get<Calibrated<FlatPort>>(thin.lens).params[10] = 0.0;
     const Localization wrong = localize(sample.frames, thin, sample.config);

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
 
 #include "alidade/testing/swaying.h"
 
@@ -54,12 +57,26 @@ Swaying held(std::uint64_t seed) {
   return swaying;
 }
 
-std::optional<ReadScale> depth_scale(DepthFault fault, std::uint64_t seed, const DepthArm& arm = {}) {
+std::optional<ReadScale> depth_scale(DepthFault fault, std::uint64_t seed, const DepthArm& arm) {
   const Swaying swaying = held(seed);
   return scale_by_depth(depths(swaying, fault, seed), 0.01, swaying.path(duration_s), arm);
 }
 
-Drawn drawn_depths(DepthFault fault, int num, const DepthArm& arm = {}) {
+/// Where the arm is not given: several tests ask for the same.
+const std::optional<ReadScale>& depth_scale(DepthFault fault, std::uint64_t seed) {
+  static std::map<std::pair<DepthFault, std::uint64_t>, std::optional<ReadScale>> known;
+  const auto [at, is_new] = known.try_emplace({fault, seed});
+  if (is_new) at->second = depth_scale(fault, seed, DepthArm{});
+  return at->second;
+}
+
+Drawn drawn_depths(DepthFault fault, int num) {
+  Drawn drawn;
+  for (int i = 1; i <= num; ++i) drawn.add(depth_scale(fault, static_cast<std::uint64_t>(i)));
+  return drawn;
+}
+
+Drawn drawn_depths(DepthFault fault, int num, const DepthArm& arm) {
   Drawn drawn;
   for (int i = 1; i <= num; ++i) drawn.add(depth_scale(fault, static_cast<std::uint64_t>(i), arm));
   return drawn;

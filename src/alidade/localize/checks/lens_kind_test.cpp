@@ -42,11 +42,11 @@ Localization located(const HoverRun& run, const Camera& camera) {
   return localize(run.frames, camera, config);
 }
 
-HoverRun brief_run(HoverLens lens, std::uint64_t seed, double mismatches = 0.0) {
+HoverRun brief_run(HoverLens lens, std::uint64_t seed, double mismatches = 0.0, int num_frames = 60) {
   Hover scene;
   scene.mismatches = mismatches;
   scene.lens = lens;
-  scene.num_frames = 90;
+  scene.num_frames = num_frames;
   scene.num_others = 40;
   return hovering(scene, seed);
 }
@@ -94,11 +94,13 @@ TEST(LensKind, TheRightKindIsNotDoubted) {
   }
 }
 
+constexpr int focal_frames = 90;  // that many determine a focal length
+
 /// Of everything but the focal length, and a path with that: the estimate is what it was, within σ.
 TEST(LensKind, AWrongFocalLengthIsEstimatedAndNamed) {
   for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye}) {
     for (const double focal : {0.75, 1.34}) {
-      const HoverRun run = brief_run(lens, 4);
+      const HoverRun run = brief_run(lens, 4, 0.0, focal_frames);
       const Localization result = located(run, sure(run.camera, focal));
       const std::string what = (lens == HoverLens::brown ? "Brown, " : "fisheye, ") + std::to_string(focal);
       ASSERT_TRUE(result.given_camera) << what << ": " << result.verdict.sentence;
@@ -118,7 +120,7 @@ TEST(LensKind, AWrongFocalLengthIsEstimatedAndNamed) {
 
 /// A focal length as wrong as its covariance says is counted, and contradicts nothing.
 TEST(LensKind, AFocalLengthWithinItsSigmaIsLeft) {
-  const HoverRun run = brief_run(HoverLens::brown, 5);
+  const HoverRun run = brief_run(HoverLens::brown, 5, 0.0, focal_frames);
   Camera camera = sure(run.camera, 1.03);
   camera.cov.diagonal().head<2>().setConstant(std::pow(0.03 * params(camera.lens)[0], 2));
   EXPECT_FALSE(located(run, camera).given_camera);

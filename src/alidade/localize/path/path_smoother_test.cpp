@@ -160,7 +160,7 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
   for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye, HoverLens::port}) {
     double nees = 0.0;
     for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
-      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 120, .num_others = 30}, 1000 + seed);
+      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 80, .num_others = 30}, 1000 + seed);
       const Localization report = hover_localized(run, run.camera);
       EXPECT_TRUE(report.is_smoothed);
       nees += mean_nees(report, run) / num_seeds;
@@ -212,7 +212,7 @@ TEST(SimpleCase, TheLensesCovarianceIsCounted) {
   double counted = 0.0, ignored = 0.0;
   Draws draws(77);
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
-    const HoverRun run = testing::hovering({.num_frames = 90, .num_others = 30}, 500 + seed);
+    const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 30}, 500 + seed);
     Camera given = run.camera;
     Eigen::VectorXd values = params(given.lens), sigma = Eigen::VectorXd::Zero(values.size());
     sigma.head<4>() << 4.0, 4.0, 3.0, 3.0;

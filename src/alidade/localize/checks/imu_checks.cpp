@@ -96,6 +96,33 @@ std::string imu_fault_text(const ImuEstimate& imu) {
   return "";
 }
 
+namespace {
+
+/// Biases that walk more than they were said to, and a clock that runs fast.
+void add_drifts(const ImuEstimate& imu, Verdict& verdict) {
+  constexpr double any_clock_rate = 5e-4;
+  const auto add = [&](const char* sensor, double factor, const Eigen::Vector3d& by, const char* unit) {
+    if (!(factor > 1.0)) return;
+    verdict.checks.push_back(
+        {"IMU drift", State::care,
+         fmt::format(
+             "the bias of the IMU's {0} drifts, by {1:.2g}, {2:.2g}, {3:.2g} {4} over the path, {5:.2g} times as "
+             "much as --{0}-walk says: estimated with the path; let it warm up, or give --{0}-walk",
+             sensor, by.x(), by.y(), by.z(), unit, factor),
+         factor, 1.0, "1", "path"});
+  };
+  add("gyro", imu.rate_walk_factor, imu.rate_drift, "rad/s");
+  add("accelerometer", imu.force_walk_factor, imu.force_drift, "m/s²");
+  if (std::abs(imu.clock_rate) > any_clock_rate)
+    verdict.checks.push_back(
+        {"IMU clock rate", State::care,
+         fmt::format("the IMU's clock runs {:.2g} ± {:.1g} % {}: corrected", 100.0 * std::abs(imu.clock_rate),
+                     100.0 * imu.sigma_clock_rate, imu.clock_rate > 0.0 ? "fast" : "slow"),
+         std::abs(imu.clock_rate), any_clock_rate, "1", "path"});
+}
+
+}  // namespace
+
 /// Of readings that are used: what of them is not as given.
 void add_imu(const Localization& report, Verdict& verdict) {
   if (!report.imu || report.imu->fault != ImuFault::none) return;
@@ -122,6 +149,7 @@ void add_imu(const Localization& report, Verdict& verdict) {
                               fmt::format("the IMU's clock is {:.3g} s {} the camera's, {:.2g} frames: corrected", late,
                                           imu.late_s > 0.0 ? "after" : "before", late / imu.frame_period_s),
                               late, imu.frame_period_s, "s", "path"});
+  add_drifts(imu, verdict);
   const double num = static_cast<double>(imu.num_steps + imu.num_rejected + imu.num_missing);
   const double missing = static_cast<double>(imu.num_missing) / num,
                rejected = static_cast<double>(imu.num_rejected) / num;

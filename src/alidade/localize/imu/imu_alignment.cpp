@@ -224,15 +224,18 @@ ImuAlignment align_imu(const Imu& imu, std::span<const TimedPose> path) {
   estimate.ratio = force ? force->mean : 1.0;
   if (estimate.fault != ImuFault::none) return out;
   RateMatch match = match_rates(imu.readings, path);
-  if (match.explained < little) match.late_s = 0.0;
+  if (match.explained < little) match.late_s = match.clock_rate = 0.0;
   estimate.fault = rates_fault(match, estimate);
   if (estimate.fault == ImuFault::none) estimate.fault = mount(imu, match, estimate);
   estimate.late_s = match.late_s;
   estimate.sigma_late_s = match.sigma_late_s;
+  estimate.clock_rate = match.clock_rate;
+  estimate.sigma_clock_rate = match.sigma_clock_rate;
   if (estimate.fault != ImuFault::none) return out;
   const Eigen::Quaterniond& rotation = estimate.cam_from_imu.rotation;
   for (const ImuReading& reading : imu.readings)
-    out.readings.push_back({reading.t_s - match.late_s, rotation * reading.rate_rad_s, rotation * reading.force_m_s2});
+    out.readings.push_back(
+        {path_time_s(match, reading.t_s), rotation * reading.rate_rad_s, rotation * reading.force_m_s2});
   estimate.rate_bias = rotation * match.mean_imu - match.mean_cam;
   estimate.fault = find_scale(imu, out.readings, path, estimate);
   return out;

@@ -46,12 +46,16 @@ struct ImuEstimate {
   /// At the end, in the IMU's axes.
   Eigen::Vector3d rate_bias = Eigen::Vector3d::Zero(), sigma_rate_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d force_bias = Eigen::Vector3d::Zero(), sigma_force_bias = Eigen::Vector3d::Zero();
-  double late_s = 0.0, sigma_late_s = 0.0;  ///< Its clock less the camera's; corrected.
+  double late_s = 0.0, sigma_late_s = 0.0;          ///< Its clock less the camera's; corrected.
+  double clock_rate = 0.0, sigma_clock_rate = 0.0;  ///< By which its clock is fast, relative; corrected.
   double frame_period_s = 0.0;
   double scale = 1.0, sigma_scale = 0.0;                     ///< Metres per unit of the path without it; σ over it.
   double rate_noise_factor = 1.0, force_noise_factor = 1.0;  ///< σ of the noise over the given one, where larger.
-  std::size_t num_steps = 0;                                 ///< From frame to frame: used,
-  std::size_t num_rejected = 0, num_missing = 0;             ///< rejected, and without readings.
+  /// Density of the biases' walks over the given one, where larger, and by how much they change, in the IMU's axes.
+  double rate_walk_factor = 1.0, force_walk_factor = 1.0;
+  Eigen::Vector3d rate_drift = Eigen::Vector3d::Zero(), force_drift = Eigen::Vector3d::Zero();
+  std::size_t num_steps = 0;                      ///< From frame to frame: used,
+  std::size_t num_rejected = 0, num_missing = 0;  ///< rejected, and without readings.
 };
 
 ALIDADE_PUBLIC_END

@@ -66,6 +66,7 @@ ImuState ImuState::moved(const Eigen::VectorXd& by) const {
   out.turn = (exp_so3(by.segment<3>(turn_at())) * turn).normalized();
   out.imu_in_cam += by.segment<3>(place_at());
   out.late_s += by[late_at()];
+  out.clock_rate += by[clock_rate_at()];
   out.force_scale += by[scale_at()];
   for (Eigen::Index i = 0; i < 9; ++i) out.force_axes(i / 3, i % 3) += by[force_axes_at() + i];
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -81,8 +82,8 @@ ImuRows rotation_rows(const ImuStepAt& at, std::span<const Rigid3, 2> world_from
   const ImuStep& step = at.step;
   const ImuState::Bias bias = imu.bias_at(at.t_s);
   const Vector3 rotated = log_so3(step.rotation);
-  const Vector3 more =
-      step.rotation_by_rate * (bias.rate - at.rate_bias) + imu.late_s * step.rotation_by_time + imu.rate_axes * rotated;
+  const Vector3 more = step.rotation_by_rate * (bias.rate - at.rate_bias) +
+                       imu.late_at_time(at.t_s) * step.rotation_by_time + imu.rate_axes * rotated;
   const Eigen::Quaterniond in_imu = step.rotation * exp_so3(more);
   const Eigen::Quaterniond read = imu.turn * in_imu * imu.turn.conjugate();
   const Eigen::Quaterniond between_them = world_from_cam[0].rotation.conjugate() * world_from_cam[1].rotation;
@@ -98,6 +99,7 @@ ImuRows rotation_rows(const ImuStepAt& at, std::span<const Rigid3, 2> world_from
   const Matrix3 by_more = by_read * turn * right_jacobian(more);
   add_bias(bias, by_more * step.rotation_by_rate, Matrix3::Zero(), rows);
   rows.J_imu.col(imu.late_at()) = by_more * step.rotation_by_time;
+  rows.J_imu.col(imu.clock_rate_at()) = imu.since_middle_s(at.t_s) * rows.J_imu.col(imu.late_at());
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Eigen::Index j = (i + 1) % 3, k = (i + 2) % 3;
     rows.J_imu.col(imu.rate_axes_at() + i) = by_more.col(i) * rotated[i];
@@ -120,8 +122,8 @@ ImuRows force_rows(const ImuStepAt& first, const ImuStepAt& second, std::span<co
   const Matrix3 T = turn * (Matrix3::Identity() + imu.force_axes);
   const double scale = 1.0 + imu.force_scale;
   const ImuState::Bias bias1 = imu.bias_at(first.t_s), bias2 = imu.bias_at(second.t_s);
-  const Corrected m1 = corrected(first, bias1, imu.late_s, 1.0, -1.0 / dt1);
-  const Corrected m2 = corrected(second, bias2, imu.late_s, 0.0, 1.0 / dt2);
+  const Corrected m1 = corrected(first, bias1, imu.late_at_time(first.t_s), 1.0, -1.0 / dt1);
+  const Corrected m2 = corrected(second, bias2, imu.late_at_time(second.t_s), 0.0, 1.0 / dt2);
   const Vector3 in_first = T * m1.value, in_second = T * m2.value;  // in the camera's axes
   const Vector3 change = (q[2] - q[1]) / dt2 - (q[1] - q[0]) / dt1 - half * imu.gravity_in_world;
   const Vector3 left = R0t * change - scale * (R01 * in_second);
@@ -141,6 +143,8 @@ ImuRows force_rows(const ImuStepAt& first, const ImuStepAt& second, std::span<co
   rows.J_imu.middleCols<3>(imu.turn_at()) = scale * (cross_matrix(in_first) + R01 * cross_matrix(in_second));
   rows.J_imu.middleCols<3>(imu.place_at()) = (R0t * R[2] - R01) / dt2 - (R01 - Matrix3::Identity()) / dt1;
   rows.J_imu.col(imu.late_at()) = -scale * (T * m1.by_time + R01 * T * m2.by_time);
+  rows.J_imu.col(imu.clock_rate_at()) =
+      -scale * (imu.since_middle_s(first.t_s) * T * m1.by_time + imu.since_middle_s(second.t_s) * R01 * T * m2.by_time);
   rows.J_imu.col(imu.scale_at()) = -in_first - R01 * in_second;
   const Matrix3 second_turn = R01 * turn;
   for (Eigen::Index i = 0; i < 9; ++i)

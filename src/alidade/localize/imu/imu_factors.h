@@ -23,12 +23,13 @@ struct ImuState {
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();  ///< From the axes of the given mounting to the true ones.
   Eigen::Vector3d imu_in_cam = Eigen::Vector3d::Zero();
   double late_s = 0.0;       ///< The IMU's clock less the camera's, beyond what its readings were shifted by.
+  double clock_rate = 0.0;   ///< By which it runs fast, about the middle of the path, beyond the same.
   double force_scale = 0.0;  ///< True force over the read one, less 1.
   /// What the axes are otherwise: forces are (I + A) those read, times the scale; rates (I + A) those read. Of rates it
   /// is symmetric, as their rotation is `turn`; of forces its trace is zero, as that is the scale.
   Eigen::Matrix3d force_axes = Eigen::Matrix3d::Zero(), rate_axes = Eigen::Matrix3d::Zero();
 
-  [[nodiscard]] int dim() const { return 6 * static_cast<int>(node_t_s.size()) + 26; }
+  [[nodiscard]] int dim() const { return 6 * static_cast<int>(node_t_s.size()) + 27; }
   /// Where in the vector of all these numbers each stands: of a node rate and force, then what does not vary.
   [[nodiscard]] int gravity_at() const { return 6 * static_cast<int>(node_t_s.size()); }
   [[nodiscard]] int turn_at() const { return gravity_at() + 3; }
@@ -37,6 +38,11 @@ struct ImuState {
   [[nodiscard]] int scale_at() const { return gravity_at() + 10; }
   [[nodiscard]] int force_axes_at() const { return gravity_at() + 11; }  ///< Row by row.
   [[nodiscard]] int rate_axes_at() const { return gravity_at() + 20; }   ///< The diagonal, then yz, xz, xy.
+  [[nodiscard]] int clock_rate_at() const { return gravity_at() + 26; }
+
+  /// Since the middle of the path.
+  [[nodiscard]] double since_middle_s(double t_s) const { return t_s - 0.5 * (node_t_s.front() + node_t_s.back()); }
+  [[nodiscard]] double late_at_time(double t_s) const { return late_s + clock_rate * since_middle_s(t_s); }
 
   /// The biases at a time, and by how much the node before it and the one after it count.
   struct Bias {

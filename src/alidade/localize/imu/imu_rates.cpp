@@ -140,16 +140,58 @@ void find_clock(std::span<const CameraRate> rates, const RateIntegral& integral,
   match.late_s = step_s * (best + offset);
 }
 
+constexpr double unsure_s = 0.05;
+
+/// Whether the clock is later and later, by the clocks of parts of the path, each found by itself: a straight line
+/// through them, where that is clear and leaves nothing.
+void find_clock_rate(std::span<const CameraRate> rates, const RateIntegral& integral, RateMatch& match) {
+  constexpr std::size_t part_of = 40, fewest = 3, most = 12;
+  const std::size_t num_parts = std::min(rates.size() / part_of, most);
+  if (num_parts < fewest) return;
+  Eigen::Matrix2d H = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d b = Eigen::Vector2d::Zero();
+  double squares = 0.0, num = 0.0;
+  for (std::size_t i = 0; i < num_parts; ++i) {
+    const std::size_t begin = i * rates.size() / num_parts, end = (i + 1) * rates.size() / num_parts;
+    RateMatch part;
+    find_clock(rates.subspan(begin, end - begin), integral, part);
+    if (!(part.sigma_late_s < unsure_s)) continue;
+    const Eigen::Vector2d row(1.0, 0.5 * (rates[begin].from_s + rates[end - 1].to_s) - match.mid_s);
+    const double weight = 1.0 / (part.sigma_late_s * part.sigma_late_s);
+    H += weight * row * row.transpose();
+    b += weight * part.late_s * row;
+    squares += weight * part.late_s * part.late_s;
+    num += 1.0;
+  }
+  if (num < fewest) return;
+  const Eigen::Matrix2d cov = H.inverse();
+  const Eigen::Vector2d line = cov * b;
+  const double left = std::max((squares - b.dot(line)) / (num - 2.0), 1.0), sigma = std::sqrt(left * cov(1, 1));
+  constexpr double clear = 5.0, any_rate = 0.02;
+  if (!(std::abs(line[1]) > clear * sigma) || !(std::abs(line[1]) < any_rate)) return;
+  match.late_s = line[0];
+  match.sigma_late_s = std::sqrt(left * cov(0, 0));
+  match.clock_rate = line[1];
+  match.sigma_clock_rate = sigma;
+}
+
 }  // namespace
 
-RateMatch match_rates(std::span<const ImuReading> readings, std::span<const TimedPose> path) {
+double path_time_s(const RateMatch& match, double t_s) {
+  return match.mid_s + (t_s - match.mid_s - match.late_s) / (1.0 + match.clock_rate);
+}
+
+RateMatch match_rates(std::span<const ImuReading> given, std::span<const TimedPose> path) {
   RateMatch match;
+  match.mid_s = 0.5 * (path.front().t_s + path.back().t_s);
   const std::vector<CameraRate> rates = camera_rates(path);
-  const RateIntegral integral(readings);
-  find_clock(rates, integral, match);
-  constexpr double unsure_s = 0.05;
+  const RateIntegral of_given(given);
+  find_clock(rates, of_given, match);
   if (!(match.sigma_late_s < unsure_s)) match.late_s = 0.0;
-  const Moments sums = moments(rates, integral, match.late_s);
+  find_clock_rate(rates, of_given, match);
+  std::vector<ImuReading> readings(given.begin(), given.end());
+  for (ImuReading& reading : readings) reading.t_s = path_time_s(match, reading.t_s);
+  const Moments sums = moments(rates, RateIntegral(readings), 0.0);
   match.num = sums.num;
   constexpr std::size_t enough = 10;
   if (sums.num < enough) return match;

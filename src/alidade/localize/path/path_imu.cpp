@@ -1,4 +1,5 @@
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -45,6 +46,39 @@ double noise_factor(std::span<const ImuReading> readings, Eigen::Vector3d ImuRea
   const double ratio = sigma * std::sqrt(median_of(std::move(periods_s))) / density;
   constexpr double same = 1.2;
   return std::isfinite(ratio) && ratio > same ? ratio : 1.0;
+}
+
+/// How the biases of one sensor change from node to node, by what is known of their walk and the readings.
+struct Walked {
+  Eigen::VectorXd by;   ///< Over σ of the walk,
+  Eigen::MatrixXd cov;  ///< and its covariance by both, in the same.
+};
+
+/// By how much the walk's variance is larger, at its maximum likelihood, and what that gains of −2 ln likelihood:
+/// along each eigenvector of the covariance K, what the readings alone say of it is y = u/(1 − k) with variance
+/// k/(1 − k).
+struct LargerWalk {
+  double factor = 1.0, gain = 0.0;
+};
+LargerWalk larger_walk(const Walked& walked) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(walked.cov);
+  const Eigen::VectorXd along = of.eigenvectors().transpose() * walked.by;
+  const auto cost_of = [&](double factor) {
+    constexpr double hardly = 1e-6;
+    double cost = 0.0;
+    for (Eigen::Index i = 0; i < along.size(); ++i) {
+      const double k = std::clamp(of.eigenvalues()[i], hardly, 1.0 - hardly);
+      const double variance = k / (1.0 - k) + factor;
+      cost += square_of(along[i] / (1.0 - k)) / variance + std::log(variance);
+    }
+    return cost;
+  };
+  constexpr double ratio = 1.2, most = 1e7;
+  const double given = cost_of(1.0);
+  LargerWalk best;
+  for (double factor = ratio; factor < most; factor *= ratio)
+    if (const double gained = given - cost_of(factor); gained > best.gain) best = {factor, gained};
+  return best;
 }
 
 }  // namespace
@@ -168,12 +202,14 @@ void PathSmoother::add_given_imu(const SmootherState& state, SmootherSystem& sys
   for (std::size_t i = 1; i < is.node_t_s.size(); ++i) {
     const double root_s = std::sqrt(is.node_t_s[i] - is.node_t_s[i - 1]);
     const int at = 6 * static_cast<int>(i);
-    add(at, is.rate_bias[i] - is.rate_bias[i - 1], given.noise.rate_walk * root_s, at - 6);
-    add(at + 3, is.force_bias[i] - is.force_bias[i - 1], given.noise.force_walk * root_s, at - 3);
+    add(at, is.rate_bias[i] - is.rate_bias[i - 1], given.noise.rate_walk * std::sqrt(rate_walk_) * root_s, at - 6);
+    add(at + 3, is.force_bias[i] - is.force_bias[i - 1], given.noise.force_walk * std::sqrt(force_walk_) * root_s,
+        at - 3);
   }
   add(is.turn_at(), log_so3(is.turn), given.sigma_rotation_rad);
   add(is.place_at(), is.imu_in_cam - given.start.imu_in_cam, given.sigma_position_m);
   add_one(is.late_at(), is.late_s, given.sigma_late_s);
+  add_one(is.clock_rate_at(), is.clock_rate, given.sigma_clock_rate * std::sqrt(clock_rate_));
   add_one(is.scale_at(), is.force_scale, given.noise.sigma_force_scale);
   add_given_axes(is, given.noise.sigma_axes, chain, system.cost);
   const double size = is.gravity_in_world.norm(), weight = std::pow(given.sigma_gravity_m_s2, -2);
@@ -219,6 +255,46 @@ bool PathSmoother::choose_steps() {
   return is_other;
 }
 
+/// Where the biases change by more than the walk that was given lets them, it is enlarged to what is most likely: a
+/// sensor that warms up would bend the path. So is what is believed of the clock's rate.
+bool PathSmoother::choose_walks() {
+  if (!problem_.imu) return false;
+  const auto system = build(state_, Shared::solved);
+  if (!system) return false;
+  const int num = num_solved();
+  const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
+  if (llt.info() != Eigen::Success) return false;
+  const Eigen::MatrixXd cov = llt.solve(Eigen::MatrixXd::Identity(num, num)).topLeftCorner(lens_at_, lens_at_);
+  const ImuState& is = state_.imu;
+  const auto num_spans = static_cast<Eigen::Index>(is.node_t_s.size()) - 1;
+  bool is_other = false;
+  const auto choose = [&](const std::vector<Eigen::Vector3d>& bias, Eigen::Index at, double density, double& walk) {
+    constexpr double clear = 16.0;  // 4σ
+    Eigen::MatrixXd spans = Eigen::MatrixXd::Zero(3 * num_spans, lens_at_);
+    Eigen::VectorXd by(3 * num_spans);
+    for (Eigen::Index i = 0; i < num_spans; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double sigma = density * std::sqrt(walk * (is.node_t_s[k + 1] - is.node_t_s[k]));
+      spans.block<3, 3>(3 * i, 6 * i + at) = -Eigen::Matrix3d::Identity() / sigma;
+      spans.block<3, 3>(3 * i, 6 * i + 6 + at) = Eigen::Matrix3d::Identity() / sigma;
+      by.segment<3>(3 * i) = (bias[k + 1] - bias[k]) / sigma;
+    }
+    const LargerWalk larger = larger_walk({by, spans * cov * spans.transpose()});
+    if (!(larger.gain > clear)) return;
+    walk *= larger.factor;
+    is_other = true;
+  };
+  constexpr double contradicted = 9.0;  // 3σ
+  if (const double rate = square_of(is.clock_rate / problem_.imu->sigma_clock_rate);
+      rate > contradicted * clock_rate_) {
+    clock_rate_ = rate;
+    is_other = true;
+  }
+  choose(is.rate_bias, 0, problem_.imu->noise.rate_walk, rate_walk_);
+  choose(is.force_bias, 3, problem_.imu->noise.force_walk, force_walk_);
+  return is_other;
+}
+
 /// σ of the logarithm of the path's extent: of its scale, as far as nothing else changes it.
 void PathSmoother::fill_imu(const SmootherSystem& system, const Eigen::MatrixXd& cov, const Asked& asked,
                             SmoothedPath& path) const {
@@ -226,6 +302,8 @@ void PathSmoother::fill_imu(const SmootherSystem& system, const Eigen::MatrixXd&
   SmoothedImu imu{.state = state_.imu, .sigma = cov.diagonal().head(lens_at_).cwiseSqrt()};
   imu.rate_noise_factor = std::sqrt(rate_noise_);
   imu.force_noise_factor = std::sqrt(force_noise_);
+  imu.rate_walk_factor = std::sqrt(rate_walk_);
+  imu.force_walk_factor = std::sqrt(force_walk_);
   for (std::size_t k = 0; k < rates_used_.size(); ++k) {
     imu.num_missing += steps_[k] ? 0 : 1;
     const bool is_used = uses_rates(k) && (uses_forces(k) || k >= forces_used_.size());

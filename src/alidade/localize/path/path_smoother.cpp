@@ -189,10 +189,11 @@ bool PathSmoother::choose_observations() {
 bool PathSmoother::settle_all() {
   constexpr double roughly = 0.3;
   if (!settle(roughly)) return false;
-  constexpr int max_choices = 3;
+  const int max_choices = problem_.imu ? 6 : 3;
   for (int i = 0; i < max_choices; ++i) {
+    const bool has_other_walks = choose_walks();  // before observations are others
     const bool has_others = choose_observations(), has_other_steps = choose_steps();
-    if (!has_others && !has_other_steps) break;
+    if (!has_others && !has_other_steps && !has_other_walks) break;
     if (!settle(roughly)) return false;
   }
   return heed_colour();

@@ -52,7 +52,7 @@ struct SmootherImu {
   ImuNoise noise;
   ImuState start;  ///< To begin at; its place in the camera is the given one.
   double gravity_m_s2 = 9.81, sigma_gravity_m_s2 = 0.02;
-  double sigma_rotation_rad = 0.02, sigma_position_m = 0.01, sigma_late_s = 0.01;
+  double sigma_rotation_rad = 0.02, sigma_position_m = 0.01, sigma_late_s = 0.01, sigma_clock_rate = 2e-4;
 };
 
 /// What of it a path found.
@@ -63,6 +63,7 @@ struct SmoothedImu {
   double target_scale = 0.0;  ///< Relative change of the target's size that it indicates, where there is one,
   double sigma_target = 0.0;  ///< and its σ.
   double rate_noise_factor = 1.0, force_noise_factor = 1.0;  ///< By which σ was enlarged.
+  double rate_walk_factor = 1.0, force_walk_factor = 1.0;    ///< By which the biases' walks were.
   std::size_t num_steps = 0, num_rejected = 0, num_missing = 0;
 };
 

@@ -141,6 +141,7 @@ class PathSmoother {
   void add_given_imu(const SmootherState& state, SmootherSystem& system) const;
   static void add_given_axes(const ImuState& is, double sigma, PoseChain& chain, double& cost);
   [[nodiscard]] bool choose_steps();
+  [[nodiscard]] bool choose_walks();
   void fill_imu(const SmootherSystem& system, const Eigen::MatrixXd& cov, const Asked& asked, SmoothedPath& path) const;
   [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& given_in_world) const;
   /// The observations within the gate of where they are expected now. Whether these are others than before.
@@ -198,6 +199,8 @@ class PathSmoother {
   std::vector<bool> rates_used_, forces_used_;               ///< Of each step; of each frame and the two after it.
   double rate_noise_ = 1.0, force_noise_ = 1.0;              ///< By which the given variances are larger,
   double rate_noise_floor_ = 1.0, force_noise_floor_ = 1.0;  ///< and are by the readings alone.
+  double rate_walk_ = 1.0, force_walk_ = 1.0;                ///< By which those of the biases' walks are,
+  double clock_rate_ = 1.0;                                  ///< and that of the clock's rate.
   /// The frames in which a point is in the equations, by its observations; none: it has no part in them.
   struct Life {
     std::size_t first = 0, last = 0;

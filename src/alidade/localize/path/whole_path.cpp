@@ -199,7 +199,7 @@ std::vector<TimedPose> poses_of(const SmootherProblem& problem, const SmoothedPa
 /// An IMU as the smoother takes it, from its first estimate on. Its clock and rotation may still move: what they were
 /// found by is in the equations again.
 SmootherImu imu_to_solve(const Imu& given, ImuAlignment alignment, std::span<const double> t_s) {
-  constexpr double found_rotation_rad = 0.3, found_position_m = 0.1, found_late_s = 0.02;
+  constexpr double found_rotation_rad = 0.3, found_position_m = 0.1, found_late_s = 0.02, any_clock_rate = 5e-5;
   constexpr double node_apart_s = 10.0, most_nodes = 9.0;
   SmootherImu imu{.readings = std::move(alignment.readings), .noise = given.noise, .start = {}};
   imu.gravity_m_s2 = given.gravity_m_s2;
@@ -207,6 +207,7 @@ SmootherImu imu_to_solve(const Imu& given, ImuAlignment alignment, std::span<con
   imu.sigma_rotation_rad = given.mounting ? given.mounting->sigma_rotation_rad : found_rotation_rad;
   imu.sigma_position_m = given.mounting ? given.mounting->sigma_position_m : found_position_m;
   imu.sigma_late_s = found_late_s;
+  imu.sigma_clock_rate = std::hypot(any_clock_rate, 3.0 * alignment.estimate.sigma_clock_rate);
   const ImuEstimate& found = alignment.estimate;
   const double length_s = t_s.back() - t_s.front();
   const int num = static_cast<int>(std::clamp(std::ceil(length_s / node_apart_s), 1.0, most_nodes - 1.0)) + 1;
@@ -240,6 +241,12 @@ void fill_estimate(const SmoothedImu& found, ImuEstimate& estimate) {
   estimate.sigma_gravity = found.sigma.segment<3>(state.gravity_at());
   estimate.late_s += state.late_s;
   estimate.sigma_late_s = found.sigma[state.late_at()];
+  estimate.clock_rate += state.clock_rate;
+  estimate.sigma_clock_rate = found.sigma[state.clock_rate_at()];
+  estimate.rate_walk_factor = found.rate_walk_factor;
+  estimate.force_walk_factor = found.force_walk_factor;
+  estimate.rate_drift = imu_from_cam * (state.rate_bias.back() - state.rate_bias.front());
+  estimate.force_drift = imu_from_cam * (state.force_bias.back() - state.force_bias.front());
   estimate.rate_noise_factor = found.rate_noise_factor;
   estimate.force_noise_factor = found.force_noise_factor;
   estimate.num_steps = found.num_steps;

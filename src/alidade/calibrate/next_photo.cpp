@@ -1,11 +1,11 @@
 #include "alidade/calibrate/next_photo.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/calibrate/pose_information.h"
 #include "alidade/camera/projection_sigma.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -79,9 +79,7 @@ NextPhotoPlan plan_next_photos(const Camera& camera, double noise_px, const std:
   if (candidates.empty()) return plan;
   // Scaled to unit diagonal: focal lengths and k3 differ by many orders.
   const Eigen::VectorXd scale = cov.diagonal().cwiseSqrt();
-  const auto inverse = [&](const Eigen::MatrixXd& S) -> Eigen::MatrixXd {
-    return S.llt().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
-  };
+  const auto inverse = [](const Eigen::MatrixXd& S) { return Llt(S).inverse(); };
   const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * cov * scale.cwiseInverse().asDiagonal();
   Eigen::MatrixXd information = inverse(correlation);
   for (int photo = 0; photo < num_photos; ++photo) {

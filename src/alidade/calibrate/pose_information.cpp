@@ -1,9 +1,8 @@
 #include "alidade/calibrate/pose_information.h"
 
-#include <Eigen/Cholesky>
-
 #include "alidade/calibrate/solve/bundle.h"
 #include "alidade/calibrate/solve/normal_equations.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 
@@ -60,10 +59,10 @@ std::optional<Eigen::MatrixXd> lens_information(const Camera& camera, const std:
   problem.prior_information = Eigen::VectorXd::Zero(problem.prior_value.size());
   NormalEquations eq;
   if (!linearize(problem, {camera.lens, {cam_from_board}, board_points}, eq)) return std::nullopt;
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V.front());
-  if (V.info() != Eigen::Success) return std::nullopt;
+  const Llt V(eq.V.front());
+  if (!V.is_positive()) return std::nullopt;
   const Eigen::MatrixXd H = eq.H.selfadjointView<Eigen::Lower>();
-  return Eigen::MatrixXd(H - eq.coupling(0) * V.solve(eq.coupling(0).transpose()));
+  return Eigen::MatrixXd(H - eq.coupling(0) * V.solve_each(eq.coupling(0).transpose()));
 }
 
 }  // namespace alidade

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/board/board_pose.h"
 #include "alidade/calibrate/pose_information.h"
 #include "alidade/calibrate/solve/normal_equations.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -60,9 +60,7 @@ void learn(const std::vector<BoardView>& views, LensSoFar& lens) {
     if (gained) information += *gained / (lens.noise_px * lens.noise_px);
   }
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  const Eigen::MatrixXd inverse = scaled.llt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
-  const Eigen::MatrixXd cov = scale.asDiagonal() * inverse * scale.asDiagonal();
+  const Eigen::MatrixXd cov = scaled_by(scale, Llt(scaled_by(scale, information)).inverse());
   lens.camera.cov = full_matrix(cov, free, lens.camera.cov.rows());
 }
 
@@ -108,9 +106,9 @@ std::vector<OwnFocal> own_focals(const LensSoFar& lens, const std::vector<BoardV
     problem.prior_information = Eigen::VectorXd::Zero(problem.prior_value.size());
     NormalEquations eq;
     if (!linearize(problem, {lens.camera.lens, {fit.cam_from_board}, lens.board_points}, eq)) continue;
-    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V.front());
+    const Llt V(eq.V.front());
     const Eigen::Matrix2d H = eq.H.selfadjointView<Eigen::Lower>();
-    const Eigen::Matrix2d S = H - eq.coupling(0) * V.solve(eq.coupling(0).transpose());
+    const Eigen::Matrix2d S = H - eq.coupling(0) * V.solve_each(eq.coupling(0).transpose());
     const Eigen::Vector2d g = eq.gradient - eq.coupling(0) * V.solve(eq.pose_gradient.front());
     const double information = S.sum();  // both focal lengths move together
     if (!(information > 0.0)) continue;

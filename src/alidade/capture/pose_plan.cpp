@@ -1,11 +1,11 @@
 #include "alidade/capture/pose_plan.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "alidade/calibrate/pose_information.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -14,9 +14,7 @@ constexpr double tilt_rad = 0.55;     // 32°: what a person holds easily
 constexpr double other_share = 0.08;  // of the board: so far from every photo that is kept
 constexpr double edge_share = 0.03;   // of the image's width that an outline keeps from its edge
 
-Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix) {
-  return matrix.llt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
-}
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix) { return Llt(matrix).inverse(); }
 
 /// The worst pixel counts most; the rest of the image decides between poses that serve it alike.
 double score(const SigmaMap::Summary& sigma) { return 0.7 * std::log(sigma.worst_px) + 0.3 * std::log(sigma.rms_px); }

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <cctype>
 #include <cmath>
 #include <functional>
@@ -8,6 +7,7 @@
 #include <sstream>
 
 #include "alidade/formats/camera_formats.h"
+#include "alidade/geometry/decompositions.h"
 
 // Cameras of the first monocular SLAM programs and of the calibration before them: A. J. Davison's SceneLib
 // (`cam.fku = 195;`), J. Civera's initialize_cam.m (two distortion parameters), J. Heikkilä & O. Silvén's toolbox of
@@ -114,7 +114,7 @@ NearestLens nearest(const Eigen::Vector4d& focal_centre, std::span<const Sample>
       for (int k = 0; k < num; ++k) A(row, k) = along * std::pow(base, 2 * k + 3);
     }
   }
-  const Eigen::VectorXd k = A.colPivHouseholderQr().solve(b);
+  const Eigen::VectorXd k = least_squares(A, b);
   NearestLens found;
   if (is_fisheye) {
     Calibrated<KannalaBrandt> lens;

@@ -55,8 +55,9 @@ Eigen::MatrixXd minimum_norm_solution(const Eigen::Ref<const Eigen::MatrixXd>& A
 
 Ldlt::Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric) : ldlt_(symmetric) {}
 bool Ldlt::is_positive() const { return ldlt_.info() == Eigen::Success && ldlt_.isPositive(); }
+Eigen::VectorXd Ldlt::pivots() const { return ldlt_.vectorD(); }
 double Ldlt::min_pivot() const {
-  const Eigen::VectorXd D = ldlt_.vectorD();
+  const Eigen::VectorXd D = pivots();
   return ldlt_.info() == Eigen::Success && D.allFinite() ? D.minCoeff() : std::numeric_limits<double>::quiet_NaN();
 }
 Eigen::VectorXd Ldlt::solve(const Eigen::Ref<const Eigen::VectorXd>& b) const { return ldlt_.solve(b); }
@@ -73,6 +74,18 @@ Eigen::MatrixXd inverse_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A) { 
 double squared_mahalanobis(const Eigen::Ref<const Eigen::VectorXd>& error,
                            const Eigen::Ref<const Eigen::MatrixXd>& cov) {
   return error.dot(Ldlt(cov).solve(error));
+}
+
+Llt::Llt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric) : llt_(symmetric) {}
+bool Llt::is_positive() const { return llt_.info() == Eigen::Success; }
+Eigen::VectorXd Llt::solve(const Eigen::Ref<const Eigen::VectorXd>& b) const { return llt_.solve(b); }
+Eigen::MatrixXd Llt::solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const { return llt_.solve(B); }
+Eigen::MatrixXd Llt::inverse() const { return llt_.solve(Eigen::MatrixXd::Identity(llt_.rows(), llt_.cols())); }
+Eigen::MatrixXd Llt::lower() const { return llt_.matrixL(); }
+Eigen::MatrixXd Llt::whitened(const Eigen::Ref<const Eigen::MatrixXd>& B) const { return llt_.matrixL().solve(B); }
+
+Eigen::MatrixXd scaled_by(const Eigen::VectorXd& scale, const Eigen::MatrixXd& A) {
+  return scale.asDiagonal() * A * scale.asDiagonal();
 }
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M) {

@@ -52,7 +52,8 @@ class Ldlt {
   Ldlt() = default;  ///< Of nothing yet.
   explicit Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric);
   [[nodiscard]] bool is_positive() const;
-  [[nodiscard]] double min_pivot() const;  ///< Of D; NaN where the matrix has no such decomposition.
+  [[nodiscard]] Eigen::VectorXd pivots() const;  ///< D.
+  [[nodiscard]] double min_pivot() const;        ///< Of D; NaN where the matrix has no such decomposition.
   [[nodiscard]] Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd>& b) const;
   [[nodiscard]] Eigen::MatrixXd solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const;  ///< Column by column.
   [[nodiscard]] Eigen::MatrixXd inverse() const;
@@ -67,6 +68,25 @@ class Ldlt {
 /// eᵀ Σ⁻¹ e: χ² with as many degrees of freedom as e has components, where Σ is its covariance.
 [[nodiscard]] double squared_mahalanobis(const Eigen::Ref<const Eigen::VectorXd>& error,
                                          const Eigen::Ref<const Eigen::MatrixXd>& cov);
+
+/// L Lᵀ of a symmetric positive definite matrix, n × n; its lower triangle is read. Where it is none, is_positive()
+/// says so, and the rest is of no use.
+class Llt {
+ public:
+  explicit Llt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric);
+  [[nodiscard]] bool is_positive() const;
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd>& b) const;
+  [[nodiscard]] Eigen::MatrixXd solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const;  ///< Column by column.
+  [[nodiscard]] Eigen::MatrixXd inverse() const;
+  [[nodiscard]] Eigen::MatrixXd lower() const;                                               ///< L.
+  [[nodiscard]] Eigen::MatrixXd whitened(const Eigen::Ref<const Eigen::MatrixXd>& B) const;  ///< L⁻¹ B.
+
+ private:
+  Eigen::LLT<Eigen::MatrixXd> llt_;
+};
+
+/// diag(scale) A diag(scale).
+[[nodiscard]] Eigen::MatrixXd scaled_by(const Eigen::VectorXd& scale, const Eigen::MatrixXd& A);
 
 /// The rotation nearest to a matrix (Frobenius): U diag(1, 1, det UVᵀ) Vᵀ. W. Kabsch, Acta Cryst. A32, 1976.
 [[nodiscard]] Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M);

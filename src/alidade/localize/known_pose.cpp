@@ -1,6 +1,5 @@
 #include "alidade/localize/known_pose.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -227,11 +226,11 @@ std::optional<StartHypothesis> start_at(const Camera& camera, const InSpace& see
                                 std::pow(seen.placed[i].sigma_px, 2) * Eigen::Matrix2d::Identity();
     information += view->J_px_pose.transpose() * cov.inverse() * view->J_px_pose;
   }
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt(information);
-  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Llt llt(information);
+  if (!llt.is_positive()) return std::nullopt;
   StartHypothesis start;
   start.motion.world_from_cam = found.world_from_cam;
-  start.cov.topLeftCorner<6, 6>() = llt.solve(Eigen::Matrix<double, 6, 6>::Identity());
+  start.cov.topLeftCorner<6, 6>() = llt.inverse();
   start.cov.diagonal().segment<3>(6).setConstant(config.sigma_speed_m_s * config.sigma_speed_m_s);
   start.cov.diagonal().tail<3>().setConstant(config.sigma_rate_rad_s * config.sigma_rate_rad_s);
   return start;

@@ -1,10 +1,10 @@
 #include "alidade/network/camera_fault.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
 
 namespace alidade {
@@ -26,7 +26,7 @@ double flatness_of(std::span<const Eigen::Vector3d> path) {
   for (const Eigen::Vector3d& point : path) mean += point / static_cast<double>(path.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : path) scatter += (point - mean) * (point - mean).transpose();
-  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
+  const Eigen::Vector3d squares = symmetric_eigen3(scatter).values;
   return squares[2] > 0.0 ? std::sqrt(std::max(0.0, squares[0]) / squares[2]) : 1.0;
 }
 

@@ -1,6 +1,5 @@
 #include "alidade/network/moving_clusters.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -120,10 +119,10 @@ MovingClusters moving_clusters(const MovingProblem& problem, const SolvedMoving&
     best = std::move(all);
   }
   out.cov = out.of_time.cov;
-  const Eigen::LLT<MatrixXd> llt(out.cov);
-  if (llt.info() == Eigen::Success) {
-    const MatrixXd L = llt.matrixL();
-    out.cov += L * shared_by_cameras(best.pulls, llt.matrixL().solve(cov)) * L.transpose();
+  const Llt llt(out.cov);
+  if (llt.is_positive()) {
+    const MatrixXd L = llt.lower();
+    out.cov += L * shared_by_cameras(best.pulls, llt.whitened(cov)) * L.transpose();
   }
   for (const MatrixXd& pull : best.lens_pull) out.by_lens.emplace_back(-cov * pull);
   return out;

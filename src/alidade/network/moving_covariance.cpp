@@ -1,7 +1,7 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/network/moving_given.h"
 
@@ -44,7 +44,7 @@ Eigen::VectorXd by_scale(const MovingProblem& problem, const Rig& rig, double si
 /// independent. The reference moves, too.
 Eigen::MatrixXd by_similarity(const MovingProblem& problem, const Rig& rig, const PathMatch& match) {
   Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(num_head_params * static_cast<Eigen::Index>(problem.placed.size()), 7);
-  const Eigen::Matrix3d turn = match.cov_rotation.llt().matrixL();
+  const Eigen::Matrix3d turn = Llt(match.cov_rotation).lower();
   for (std::size_t h = 0; h < problem.placed.size(); ++h) {
     if (!problem.placed[h]) continue;
     const Head& head = rig.heads[h].head;

@@ -1,7 +1,7 @@
 #include "alidade/patches/image_warp.h"
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -49,11 +49,11 @@ bool ImageWarp::solve(std::span<const PointMove> moves, double max_residual_px) 
     right += row * move.to_px.transpose();
     ++used;
   }
-  const Eigen::LDLT<Eigen::MatrixXd> factors(normal.selfadjointView<Eigen::Lower>());
+  const Ldlt factors(normal);
   // Points on a curve of third order leave the cubic open: 10⁻⁸ of the largest pivot is a curve.
-  const bool is_open = factors.vectorD().minCoeff() < 1e-8 * factors.vectorD().maxCoeff();
+  const bool is_open = factors.pivots().minCoeff() < 1e-8 * factors.pivots().maxCoeff();
   if (used < min_points || is_open) return false;
-  coefficients_ = factors.solve(right);
+  coefficients_ = factors.solve_each(right);
   return coefficients_.allFinite();
 }
 

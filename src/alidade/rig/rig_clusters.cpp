@@ -1,6 +1,5 @@
 #include "alidade/rig/rig_clusters.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -42,8 +41,7 @@ std::optional<ViewEquations> view_equations(const RigProblem& problem, const Sol
 std::vector<ClusterStep> view_cluster_steps(const RigProblem& problem, const SolvedRig& solved,
                                             const Eigen::MatrixXd& cov, std::span<const double> weights) {
   std::vector<ClusterStep> steps;
-  const Eigen::LLT<Eigen::MatrixXd> llt(cov);
-  const Eigen::MatrixXd L = llt.matrixL();
+  const Eigen::MatrixXd L = Llt(cov).lower();
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     if (!(weights[v] > 0.0)) continue;
     const auto at = view_equations(problem, solved, v);

@@ -1,6 +1,5 @@
 #include "alidade/turned/photo_scatter.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -34,10 +33,9 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
   const Eigen::MatrixXd cov = inverse_symmetric(turned_normal(fit.bundle, fit.prior, fit.solve).information);
   ScatterCovariance scatter;
   scatter.cov_model = cov.topLeftCorner<num_camera, num_camera>();
-  const Eigen::LLT<TurnedInformation> root(scatter.cov_model);
+  const Llt root(scatter.cov_model);
   const auto whitened = [&](const TurnedInformation& M) {
-    const TurnedInformation half = root.matrixL().solve(M);
-    return TurnedInformation(root.matrixL().solve(half.transpose()));
+    return TurnedInformation(root.whitened(root.whitened(M).transpose()));
   };
   const auto count = fit.bundle.cam_from_world.size();
   TurnedInformation seen = TurnedInformation::Zero(), expected = TurnedInformation::Zero();
@@ -48,7 +46,7 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
     Eigen::MatrixXd information = without.information;
     information.diagonal().array() += 1e-6;  // a photo that nothing joins any more may rotate freely
     const Eigen::MatrixXd cov_without = inverse_symmetric(information);
-    const Camera6 change = root.matrixL().solve(Camera6(-(cov_without * without.gradient).head<num_camera>()));
+    const Camera6 change = root.whitened(Camera6(-(cov_without * without.gradient).head<num_camera>()));
     seen += change * change.transpose();
     const TurnedInformation cov_of_others = cov_without.topLeftCorner<num_camera, num_camera>();
     const TurnedInformation of_model = whitened(TurnedInformation(cov_of_others - scatter.cov_model));
@@ -62,7 +60,7 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
   expected = positive_part(expected);
   scatter.design_effect = expected.trace() > 0.0 ? seen.trace() / expected.trace() : 1.0;
   scatter.degrees_of_freedom = sum2 > 0.0 ? std::max(sum * sum / sum2, 2.0) : n;
-  const TurnedInformation L = root.matrixL();
+  const TurnedInformation L = root.lower();
   scatter.cov = L * with_scatter(seen, expected, n, scatter) * L.transpose();
   return scatter;
 }

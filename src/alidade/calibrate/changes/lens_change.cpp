@@ -1,6 +1,5 @@
 #include "alidade/calibrate/changes/lens_change.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "alidade/calibrate/study.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -64,9 +64,9 @@ std::optional<Estimated> estimated_of(std::span<const ViewScore> views, const Ca
     sum += view.gradient(free);
   }
   const VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * H * scale.asDiagonal());
-  if (num == 0 || llt.info() != Eigen::Success || !scale.allFinite()) return std::nullopt;
-  all.whiten = scale.asDiagonal() * MatrixXd(llt.matrixU().solve(MatrixXd::Identity(num, num)));
+  const Llt llt(scaled_by(scale, H));
+  if (num == 0 || !llt.is_positive() || !scale.allFinite()) return std::nullopt;
+  all.whiten = scale.asDiagonal() * llt.whitened(MatrixXd::Identity(num, num)).transpose();
   all.to_optimum = -(all.whiten * (all.whiten.transpose() * sum));
   all.scores.resize(num, static_cast<Index>(views.size()));
   for (std::size_t k = 0; k < views.size(); ++k)

@@ -1,7 +1,6 @@
 #include "alidade/calibrate/changes/photo_effects.h"
+#include "alidade/geometry/decompositions.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -46,7 +45,7 @@ Scores scores_of(std::span<const ViewScore> views, const MatrixXd& columns) {
     sum += scores.information.back();
     rest += scores.gradient.back();
   }
-  const VectorXd to_optimum = -sum.ldlt().solve(rest);
+  const VectorXd to_optimum = -solve_symmetric(sum, rest);
   for (std::size_t k = 0; k < views.size(); ++k) scores.gradient[k] += scores.information[k] * to_optimum;
   return scores;
 }
@@ -59,13 +58,13 @@ struct Square {
 
 Square square_of(const MatrixXd& information, const VectorXd& gradient) {
   const VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * information * scale.asDiagonal());
-  const VectorXd along = eigen.eigenvectors().transpose() * scale.asDiagonal() * gradient;
+  const SymmetricEigen eigen = symmetric_eigen(scaled_by(scale, information));
+  const VectorXd along = eigen.vectors.transpose() * scale.cwiseProduct(gradient);
   Square square;
   constexpr double determined = 1e-7;
   for (Index i = 0; i < along.size(); ++i) {
-    if (eigen.eigenvalues()[i] < determined) continue;
-    square.sum += along[i] * along[i] / eigen.eigenvalues()[i];
+    if (eigen.values[i] < determined) continue;
+    square.sum += along[i] * along[i] / eigen.values[i];
     ++square.dimensions;
   }
   return square;
@@ -81,7 +80,7 @@ double left_over(const Scores& scores, const std::vector<Index>& own, const std:
     MatrixXd left = I(others, others);
     VectorXd score = g(others);
     if (!own.empty()) {
-      const MatrixXd follow = MatrixXd(I(own, own)).ldlt().solve(MatrixXd(I(own, others)));
+      const MatrixXd follow = Ldlt(MatrixXd(I(own, own))).solve_each(MatrixXd(I(own, others)));
       left -= I(others, own) * follow;
       score -= follow.transpose() * g(own);
     }

@@ -1,11 +1,11 @@
 #include "alidade/calibrate/checks/assumed.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "alidade/calibrate/study.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -30,9 +30,9 @@ Eigen::MatrixXd sensitivity(std::span<const ViewScore> scores, const LensSplit& 
   for (const ViewScore& view : scores) S += view.information;
   const Eigen::MatrixXd of_free = S(split.free, split.free);
   const Eigen::VectorXd scale = of_free.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * of_free * scale.asDiagonal());
-  if (llt.info() != Eigen::Success) return {};
-  return -(scale.asDiagonal() * llt.solve(scale.asDiagonal() * S(split.free, split.fixed)));
+  const Llt llt(scaled_by(scale, of_free));
+  if (!llt.is_positive()) return {};
+  return -(scale.asDiagonal() * llt.solve_each(scale.asDiagonal() * S(split.free, split.fixed)));
 }
 
 /// The square of a board. The lens of a central camera is the same for all; the poses' distances follow it.

@@ -1,13 +1,12 @@
 #include "alidade/calibrate/checks/lens_covariance.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "alidade/calibrate/solve/view_steps.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -38,10 +37,10 @@ void raise(const Eigen::MatrixXd& by, ClusterCovariance& clusters) {
 
 /// What corners share with themselves from view to view, less what single corners of single views would.
 Eigen::MatrixXd shared_by_corners(const Eigen::MatrixXd& L, double noise_variance, CornerSteps corners) {
-  const Eigen::LLT<Eigen::MatrixXd> both(corners.by_themselves / noise_variance);
-  if (corners.steps.empty() || both.info() != Eigen::Success) return Eigen::MatrixXd::Zero(L.rows(), L.rows());
-  for (ClusterStep& corner : corners.steps) both.matrixL().solveInPlace(corner.step);
-  const Eigen::MatrixXd to_both = L * Eigen::MatrixXd(both.matrixL());
+  const Llt both(corners.by_themselves / noise_variance);
+  if (corners.steps.empty() || !both.is_positive()) return Eigen::MatrixXd::Zero(L.rows(), L.rows());
+  for (ClusterStep& corner : corners.steps) corner.step = both.whitened(corner.step);
+  const Eigen::MatrixXd to_both = L * both.lower();
   const ClusterCovariance shared = whitened_cluster_covariance(to_both, noise_variance, std::move(corners.steps));
   return shared.cov - noise_variance * to_both * to_both.transpose();
 }
@@ -50,9 +49,9 @@ Eigen::MatrixXd shared_by_corners(const Eigen::MatrixXd& L, double noise_varianc
 Eigen::MatrixXd part_above(const Eigen::MatrixXd& more, const Eigen::MatrixXd& seen, const Eigen::MatrixXd& L) {
   const auto lower = L.triangularView<Eigen::Lower>();
   const Eigen::MatrixXd half = lower.solve(more - seen);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> above(lower.solve(half.transpose()));
-  const Eigen::MatrixXd to_lens = L * above.eigenvectors();
-  return to_lens * above.eigenvalues().cwiseMax(0.0).asDiagonal() * to_lens.transpose();
+  const SymmetricEigen above = symmetric_eigen(lower.solve(half.transpose()));
+  const Eigen::MatrixXd to_lens = L * above.vectors;
+  return to_lens * above.values.cwiseMax(0.0).asDiagonal() * to_lens.transpose();
 }
 
 /// Adds the spread of the minima about the one that is stated. Returns their weights.
@@ -81,10 +80,10 @@ LensCovariance lens_covariance(const BundleProblem& problem, double noise_varian
   const auto num_free = static_cast<Eigen::Index>(free.size());
   const Eigen::Index num_params = params(result.state.lens).size();
   const Eigen::MatrixXd inverse = result.cov.topLeftCorner(num_free, num_free);
-  const Eigen::LLT<Eigen::MatrixXd> llt(inverse);
+  const Llt llt(inverse);
   ClusterCovariance clusters;
-  if (llt.info() == Eigen::Success) {
-    const Eigen::MatrixXd L = llt.matrixL();
+  if (llt.is_positive()) {
+    const Eigen::MatrixXd L = llt.lower();
     clusters = whitened_cluster_covariance(L, noise_variance, view_steps(problem, result, L));
     const Eigen::MatrixXd by_corners = shared_by_corners(L, noise_variance, corner_steps(problem, result, L));
     raise(part_above(by_corners, clusters.cov - noise_variance * inverse, L), clusters);

@@ -1,6 +1,5 @@
 #include "alidade/calibrate/checks/model_errors.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,6 +9,7 @@
 #include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/calibrate/solve/columns.h"
 #include "alidade/calibrate/study.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -120,9 +120,9 @@ std::optional<ModeScore> mode_score_of(const ModeView& view, const PreparedLens&
   Index at = 0;
   for (const Index parameter : free) J.col(at++) = column(parameter);
   for (const ErrorMode& mode : modes) J.col(at++) = column_of(mode, view, pose);
-  const Eigen::LLT<MatrixXd> V(pose.transpose() * pose);
-  if (V.info() != Eigen::Success) return std::nullopt;
-  J -= pose * V.solve(pose.transpose() * J);
+  const Llt V(MatrixXd(pose.transpose() * pose));
+  if (!V.is_positive()) return std::nullopt;
+  J -= pose * V.solve_each(pose.transpose() * J);
   return ModeScore{J.transpose() * J, J.transpose() * column(Columns::residual)};
 }
 
@@ -162,10 +162,10 @@ std::optional<ReducedModes> reduced_modes(std::vector<ModeScore> scores, Index n
   const Index num_modes = sum.gradient.size() - num_free;
   const MatrixXd H = sum.information.topLeftCorner(num_free, num_free);
   const VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * H * scale.asDiagonal());
-  if (llt.info() != Eigen::Success || !scale.allFinite()) return std::nullopt;
+  const Llt llt(scaled_by(scale, H));
+  if (!llt.is_positive() || !scale.allFinite()) return std::nullopt;
   const auto solve = [&](const MatrixXd& right) -> MatrixXd {
-    return scale.asDiagonal() * llt.solve(scale.asDiagonal() * right);
+    return scale.asDiagonal() * llt.solve_each(scale.asDiagonal() * right);
   };
   ReducedModes all{.num_free = num_free};
   const MatrixXd coupling = sum.information.topRightCorner(num_free, num_modes);
@@ -248,15 +248,15 @@ constexpr double ordinary_lengths = 2e-3;
 double sigmas_of(const VectorXd& by, const MatrixXd& cov) {
   const VectorXd scale = cov.diagonal().cwiseSqrt().cwiseInverse();
   const VectorXd scaled = scale.asDiagonal() * by;
-  return std::sqrt(scaled.dot((scale.asDiagonal() * cov * scale.asDiagonal()).ldlt().solve(scaled)));
+  return std::sqrt(squared_mahalanobis(scaled, scaled_by(scale, cov)));
 }
 
 /// What the modes `found`, estimated together, move the lens by, with what they themselves are uncertain by.
 VectorXd count_modes(const ReducedModes& all, const std::vector<Index>& found, double variance, MatrixXd& cov) {
-  const Eigen::LDLT<MatrixXd> information(all.information(found, found));
+  const Ldlt information(MatrixXd(all.information(found, found)));
   const MatrixXd follows = all.follows(Eigen::all, found);
-  const VectorXd moved = -follows * information.solve(all.score(found));
-  cov += moved * moved.transpose() + variance * follows * information.solve(follows.transpose());
+  const VectorXd moved = -follows * information.solve(VectorXd(all.score(found)));
+  cov += moved * moved.transpose() + variance * follows * information.solve_each(follows.transpose());
   return moved;
 }
 

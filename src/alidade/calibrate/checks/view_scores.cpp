@@ -1,11 +1,10 @@
 #include "alidade/calibrate/checks/view_scores.h"
 
-#include <Eigen/Cholesky>
-
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/solve/bundle.h"
 #include "alidade/calibrate/solve/normal_equations.h"
 #include "alidade/calibrate/study.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 
@@ -30,9 +29,9 @@ std::vector<ViewScore> view_scores(const Board& board, CalibrateConfig config, s
   for (const Eigen::Vector3d& point : report.board_points)
     middle += point / static_cast<double>(report.board_points.size());
   for (std::size_t k = 0; k < arrays.size(); ++k) {
-    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V[k]);
-    if (V.info() != Eigen::Success) return {};
-    const Eigen::MatrixXd follows = V.solve(eq.coupling(k).transpose());  // the pose does
+    const Llt V(eq.V[k]);
+    if (!V.is_positive()) return {};
+    const Eigen::MatrixXd follows = V.solve_each(eq.coupling(k).transpose());  // the pose does
     const auto of_view = eq.dense_of(k);
     scores.push_back({of_view.leftCols(eq.num_dense) - eq.coupling(k) * follows,
                       of_view.col(eq.num_dense) - follows.transpose() * eq.pose_gradient[k],

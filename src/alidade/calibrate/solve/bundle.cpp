@@ -1,6 +1,5 @@
 #include "alidade/calibrate/solve/bundle.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -70,9 +69,8 @@ Eigen::VectorXd unit_scale(const Eigen::MatrixXd& S) {
 std::optional<Eigen::VectorXd> solve_scaled(const Eigen::MatrixXd& S, const Eigen::VectorXd& rhs) {
   if (S.size() == 0) return Eigen::VectorXd(0);
   const Eigen::VectorXd scale = unit_scale(S);
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
-  const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> llt(scaled);
-  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Llt llt(scaled_by(scale, S));
+  if (!llt.is_positive()) return std::nullopt;
   Eigen::VectorXd x = scale.cwiseProduct(llt.solve(scale.cwiseProduct(rhs)));
   if (!x.allFinite()) return std::nullopt;
   return x;
@@ -127,9 +125,9 @@ std::optional<Step> damped_step(const BundleProblem& problem, const BundleState&
 /// Inverse of a matrix with unit diagonal; none where it is singular: then its weakest direction is in `result`.
 std::optional<Eigen::MatrixXd> inverse_of(const Eigen::MatrixXd& scaled, BundleResult& result) {
   constexpr double surely_regular = 1e-11;  // 1/|S⁻¹| (Frobenius) is a lower bound of the smallest eigenvalue
-  const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
-  if (llt.info() == Eigen::Success) {
-    Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+  const Llt llt(scaled);
+  if (llt.is_positive()) {
+    Eigen::MatrixXd inverse = llt.inverse();
     if (inverse.norm() * surely_regular < 1.0) return inverse;
   }
   const SymmetricEigen eigen = symmetric_eigen(scaled);

@@ -1,4 +1,5 @@
 #include "alidade/heads/calibration/stars.h"
+#include "alidade/geometry/decompositions.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -44,7 +45,7 @@ Similarity fitted(std::span<const Eigen::Vector2d> from, std::span<const Eigen::
     normal += row.transpose() * row;
     right += row.transpose() * to[j];
   }
-  const Eigen::Vector4d solution = normal.ldlt().solve(right);
+  const Eigen::Vector4d solution = solve_symmetric(normal, right);
   return {solution.head<2>(), solution.tail<2>()};
 }
 

@@ -1,10 +1,10 @@
 #include "alidade/localize/checks/depth_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/checks/scale_readings.h"
 
 namespace alidade {
@@ -60,9 +60,9 @@ std::optional<DepthFit> stepped(const DepthModel& model, const DepthFit& from, s
   }
   for (int i = 4; i < dim; ++i)
     if (H(i, i) == 0.0) H(i, i) = 1.0;  // no jump
-  const Eigen::LDLT<DepthFit::Matrix> ldlt(H);
-  if (ldlt.info() != Eigen::Success) return std::nullopt;
-  DepthFit fit{ldlt.solve(b), from.arm_m, ldlt.solve(DepthFit::Matrix::Identity(dim, dim))};
+  const Ldlt ldlt(H);
+  if (std::isnan(ldlt.min_pivot())) return std::nullopt;
+  DepthFit fit{ldlt.solve(b), from.arm_m, ldlt.inverse()};
   if (!fit.values.allFinite() || !fit.cov.allFinite()) return std::nullopt;
   if (model.sigma_arm_m) fit.arm_m = fit.values.tail<3>();
   for (DepthRow& row : rows) row.left = row.weight * (row.depth_m - depth_of(row, model, fit));
@@ -151,7 +151,7 @@ DepthModel with_free_arm(DepthModel model, std::span<const DepthRow> rows) {
   constexpr double hardly = 1e-9;
   H.diagonal().head<3>().array() += hardly * H.diagonal().head<3>().sum();
   H.diagonal().tail<9>().array() += 1.0 / (free_arm_m * free_arm_m);
-  const Vector13 values = H.ldlt().solve(b);
+  const Vector13 values = solve_symmetric(H, b);
   if (!values.allFinite() || values.head<3>().isZero(0.0)) return model;
   model.g = values.head<3>();
   const Eigen::Matrix3d down_arm = values.tail<9>().reshaped(3, 3);

@@ -1,6 +1,5 @@
 #include "alidade/localize/checks/lens_kind.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/observation_localizer.h"
 #include "alidade/localize/setup.h"
 
@@ -163,7 +163,7 @@ Camera nearest_of_kind(const Camera& given, const Camera& other, std::span<const
       H += at->J_px_params.transpose() * at->J_px_params;
       g += at->J_px_params.transpose() * (pixels[i] - at->px);
     }
-    lens += H.ldlt().solve(g);
+    lens += solve_symmetric(H, g);
     if (!lens.allFinite()) break;
     camera.lens = with_params(camera.lens, lens);
   }

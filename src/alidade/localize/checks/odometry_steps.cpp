@@ -1,11 +1,11 @@
 #include "alidade/localize/checks/odometry_steps.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -74,9 +74,9 @@ PartSums sums_of(std::span<const Step> steps, const StepNoise& noise) {
     }
     sums.num_steps += chain.size();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  sums.vehicle_from_path = svd.matrixU() * svd.matrixV().transpose();
-  sums.num = svd.singularValues().sum();
+  const Svd svd = svd_of(products);
+  sums.vehicle_from_path = svd.U * svd.V.transpose();
+  sums.num = svd.values.sum();
   // The rotation that fits best makes it too large, by 1.5 over the scale.
   constexpr double of_rotation = 1.5;
   if (sums.num > 0.0) sums.num -= std::min(of_rotation * sums.den / sums.num, 0.5 * sums.num);

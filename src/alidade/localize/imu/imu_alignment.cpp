@@ -1,13 +1,12 @@
 #include "alidade/localize/imu/imu_alignment.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/imu/preintegration.h"
 #include "alidade/localize/imu/imu_rates.h"
@@ -77,7 +76,7 @@ ImuFault mount(const Imu& imu, const RateMatch& match, ImuEstimate& estimate) {
     return ImuFault::mounting;
   }
   estimate.cam_from_imu.rotation = match.cam_from_imu;
-  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information).eigenvalues()[0];
+  const double least = symmetric_eigen3(information).values[0];
   return least > 1.0 / (most_sigma_rad * most_sigma_rad) ? ImuFault::none : ImuFault::unmounted;
 }
 
@@ -152,9 +151,9 @@ std::optional<AlignmentFit> fit(std::span<const AlignmentRow> rows, const Imu& i
   } else {
     H.diagonal().tail<3>().array() += 1e-3 * H.diagonal().tail<3>().sum();  // of a camera that hardly rotates
   }
-  const Eigen::LDLT<Eigen::Matrix<double, 7, 7>> ldlt(H);
-  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 0.0)) return std::nullopt;
-  AlignmentFit out{ldlt.solve(g), variance * ldlt.solve(Eigen::Matrix<double, 7, 7>::Identity())};
+  const Ldlt ldlt(H);
+  if (!(ldlt.min_pivot() > 0.0)) return std::nullopt;
+  AlignmentFit out{ldlt.solve(g), variance * ldlt.inverse()};
   if (!out.x.allFinite() || !out.cov.allFinite()) return std::nullopt;
   return out;
 }

@@ -1,6 +1,5 @@
 #include "alidade/localize/imu/imu_rates.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -85,7 +84,7 @@ struct Moments {
     Eigen::Matrix3d H = imu_imu;
     constexpr double hardly = 1e-9;
     H.diagonal().array() += hardly * (imu_imu.trace() + 1e-12);
-    return cam_cam - (cam_imu * H.ldlt().solve(cam_imu.transpose())).trace();
+    return cam_cam - (cam_imu * Ldlt(H).solve_each(cam_imu.transpose())).trace();
   }
 };
 

@@ -1,4 +1,5 @@
 #include "alidade/localize/path/path_error.h"
+#include "alidade/geometry/decompositions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +38,7 @@ void add_aligned(std::span<const Pair> pairs, const Similarity& fit, bool has_co
     const Eigen::Matrix3d R = fit.scale * fit.b_from_a.rotation.toRotationMatrix();
     sum2 += d.squaredNorm();
     variance_m2 += fit.scale * fit.scale * pair.cov.trace();
-    if (has_covs) nees += d.dot((R * pair.cov * R.transpose()).ldlt().solve(d));
+    if (has_covs) nees += squared_mahalanobis(d, R * pair.cov * R.transpose());
   }
   const auto num = static_cast<double>(pairs.size());
   error.ate_m = std::sqrt(sum2 / num);

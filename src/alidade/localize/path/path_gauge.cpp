@@ -1,5 +1,5 @@
-#include <Eigen/Cholesky>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/path_system.h"
 
 // What of a path's covariance is its shape's, where no measurement says where and how large the world is.
@@ -21,11 +21,9 @@ struct Gauge {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   int num_free = 7;
   std::vector<Eigen::MatrixXd> G, W;  ///< By pose: its moves, and the same by how much it counts.
-  Eigen::LDLT<Eigen::MatrixXd> normal;
+  Ldlt normal;
 
-  [[nodiscard]] bool is_determined() const {
-    return normal.info() == Eigen::Success && normal.vectorD().minCoeff() > 0.0;
-  }
+  [[nodiscard]] bool is_determined() const { return normal.min_pivot() > 0.0; }
   [[nodiscard]] Eigen::MatrixXd moves(const Eigen::Vector3d& point) const {
     return moved_place(point - centre).leftCols(num_free);
   }
@@ -50,7 +48,7 @@ Gauge gauge_of(std::span<const Rigid3> poses, int num_free) {
     gauge.W.back().bottomRows<3>() *= rotation_share * extent2;
     N += gauge.W.back().transpose() * gauge.G.back();
   }
-  gauge.normal.compute(N);
+  gauge.normal = Ldlt(N);
   return gauge;
 }
 
@@ -58,7 +56,7 @@ Gauge gauge_of(std::span<const Rigid3> poses, int num_free) {
 /// that moves by g with them.
 Eigen::MatrixXd aligned_cov(const Gauge& gauge, const Eigen::MatrixXd& of_sums, const Eigen::MatrixXd& P,
                             const Eigen::MatrixXd& z, const Eigen::MatrixXd& g) {
-  const Eigen::MatrixXd across = g * gauge.normal.solve(z.transpose());
+  const Eigen::MatrixXd across = g * gauge.normal.solve_each(z.transpose());
   const Eigen::MatrixXd out = P - across - across.transpose() + g * of_sums * g.transpose();
   return 0.5 * (out + out.transpose());
 }
@@ -76,13 +74,13 @@ void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& co
   PoseChain::Columns Z = system.chain.solve(gauge.W, num_solved());  // covariance with the sums that align
   Eigen::MatrixXd given = Eigen::MatrixXd::Zero(spread.J.front().cols(), gauge.num_free);
   for (std::size_t k = 0; k < num; ++k) given += spread.J[k].transpose() * gauge.W[k];
-  const Eigen::MatrixXd moved_by_given = gauge.normal.solve(given.transpose());
+  const Eigen::MatrixXd moved_by_given = gauge.normal.solve_each(given.transpose());
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(gauge.num_free, gauge.num_free);
   for (std::size_t k = 0; k < num; ++k) {
     Z.poses[k] += spread.J[k] * considered * given;
     sums += gauge.W[k].transpose() * Z.poses[k];
   }
-  const Eigen::MatrixXd of_sums = gauge.normal.solve(gauge.normal.solve(sums).transpose());
+  const Eigen::MatrixXd of_sums = gauge.normal.solve_each(gauge.normal.solve_each(sums).transpose());
   for (std::size_t k = 0; k < num; ++k) {
     spread.cov[k] = aligned_cov(gauge, of_sums, spread.cov[k], Z.poses[k], gauge.G[k]);
     spread.J[k] -= gauge.G[k] * moved_by_given;

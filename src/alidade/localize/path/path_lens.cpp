@@ -1,7 +1,7 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/path_system.h"
 
 // What a path's observations say of the lens: where they contradict what was given, it is estimated with the path.
@@ -61,7 +61,7 @@ double PathSmoother::best_cause(const Asked& all) const {
     if (!problem_.compares_causes && first != readout_cause) continue;
     const Eigen::MatrixXd information = all.information.block(causes + first, causes + first, num, num);
     const Eigen::VectorXd score = all.score.segment(causes + first, num);
-    if (information.diagonal().minCoeff() > 0.0) best = std::max(best, score.dot(information.ldlt().solve(score)));
+    if (information.diagonal().minCoeff() > 0.0) best = std::max(best, squared_mahalanobis(score, information));
   }
   return best;
 }
@@ -79,12 +79,9 @@ bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   const double num_left =
       2.0 * static_cast<double>(observations_.size()) - 6.0 * static_cast<double>(state_.poses.size());
   const double noise = std::max(1.0, system.observed_cost / std::max(num_left, 1.0));
-  const auto explained = [](const Eigen::VectorXd& of, const Eigen::MatrixXd& variance) {
-    return of.dot(variance.ldlt().solve(of));
-  };
   constexpr double far_more = 60.0;
-  if (!(explained(score, noise * information + information * known * information) > far_more)) return false;
-  return explained(score, information) > best_cause(all);
+  if (!(squared_mahalanobis(score, noise * information + information * known * information) > far_more)) return false;
+  return squared_mahalanobis(score, information) > best_cause(all);
 }
 
 }  // namespace alidade

@@ -1,8 +1,8 @@
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/path_system.h"
 
 // A flat target seen from one side hardly determines its tilt, and does so differently as it is tilted more: the
@@ -52,10 +52,9 @@ bool PathSmoother::fix_weakest(const SmoothedPath& path) {
   const double distance_m = (fixed.from.translation - target_centre_).norm();
   Eigen::Vector<double, 6> scale = Eigen::Vector<double, 6>::Ones();
   scale.head<3>() /= distance_m;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(scale.asDiagonal() * path.cov[fixed.frame] *
-                                                                         scale.asDiagonal());
-  const double sigma = std::sqrt(eigen.eigenvalues()[5]);
-  fixed.weights = scale.asDiagonal() * eigen.eigenvectors().col(5);
+  const SymmetricEigen eigen = symmetric_eigen(scaled_by(scale, path.cov[fixed.frame]));
+  const double sigma = std::sqrt(eigen.values[5]);
+  fixed.weights = scale.asDiagonal() * eigen.vectors.col(5);
   fixed.sigma = 0.02 * sigma;
   fixed.value = sigma;
   if (!(sigma > straight)) return false;

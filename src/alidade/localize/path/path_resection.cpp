@@ -1,6 +1,6 @@
 #include "alidade/localize/path/path_resection.h"
+#include "alidade/geometry/decompositions.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -51,8 +51,8 @@ bool stepped(const Camera& camera, std::span<const PlacedObservation> observatio
     H += weight * view->J.transpose() * view->J;
     g += weight * view->J.transpose() * view->residual_px;
   }
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt(H);
-  if (llt.info() != Eigen::Success) return false;
+  const Llt llt(H);
+  if (!llt.is_positive()) return false;
   const Eigen::Vector<double, 6> step = llt.solve(g);
   if (!step.allFinite()) return false;
   world_from_cam.translation += step.head<3>();

@@ -1,10 +1,10 @@
 #include "alidade/localize/path/path_smoother.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/checks/residual_structure.h"
 #include "alidade/localize/filter/given_numbers.h"
 #include "alidade/localize/path/path_system.h"
@@ -104,8 +104,8 @@ std::optional<SmootherSystem> PathSmoother::begun() {
 std::optional<SmootherSystem> PathSmoother::step_along(const SmootherSystem& system) {
   constexpr double min_share = 0.02;
   const int num = num_solved();
-  const Eigen::LLT<Eigen::MatrixXd> llt(system.chain.B.topLeftCorner(num, num));
-  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Llt llt(system.chain.B.topLeftCorner(num, num));
+  if (!llt.is_positive()) return std::nullopt;
   const Eigen::VectorXd shared = llt.solve(system.chain.b.head(num));
   const auto steps = system.chain.steps(shared);
   for (double share = 1.0; share > min_share; share *= 0.5) {
@@ -146,8 +146,8 @@ bool PathSmoother::settle(double settled) {
   auto system = begun();
   for (int iteration = 0; system && iteration < max_iterations + num_short; ++iteration) {
     const int num = num_solved();
-    const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
-    if (llt.info() != Eigen::Success) return false;
+    const Llt llt(system->chain.B.topLeftCorner(num, num));
+    if (!llt.is_positive()) return false;
     const double gain = system->chain.gain() + llt.solve(system->chain.b.head(num)).dot(system->chain.b.head(num));
     if (gain < settled) return true;
     auto next = share < long_share ? std::nullopt : step_along(*system);
@@ -295,9 +295,9 @@ double PathSmoother::motion_score(const SmootherSystem& system, const Eigen::Vec
 PathSmoother::Asked PathSmoother::asked(const SmootherSystem& system) const {
   const int num = num_solved(), all = causes_at_ + num_causes, rest = all - num;
   const Eigen::MatrixXd B = system.chain.B.topLeftCorner(all, all).selfadjointView<Eigen::Lower>();
-  const Eigen::LLT<Eigen::MatrixXd> llt(B.topLeftCorner(num, num));
+  const Llt llt(B.topLeftCorner(num, num));
   Asked asked{Eigen::MatrixXd::Identity(all, rest), {}, system.chain.b.segment(num, rest)};
-  asked.J.topRows(num) = -llt.solve(B.topRightCorner(num, rest));
+  asked.J.topRows(num) = -llt.solve_each(B.topRightCorner(num, rest));
   asked.J.bottomRows(rest).setIdentity();
   asked.information = B.bottomRightCorner(rest, rest) + B.bottomLeftCorner(rest, num) * asked.J.topRows(num);
   asked.score += asked.J.topRows(num).transpose() * system.chain.b.head(num);
@@ -308,11 +308,11 @@ PathSmoother::Asked PathSmoother::asked(const SmootherSystem& system) const {
 
 SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
   const int num = num_solved();
-  const Eigen::LLT<Eigen::MatrixXd> llt(system.chain.B.topLeftCorner(num, num));
+  const Llt llt(system.chain.B.topLeftCorner(num, num));
   const Eigen::MatrixXd considered = considered_cov();
   const Asked asked = this->asked(system);
   Eigen::MatrixXd cov = asked.J * considered * asked.J.transpose();
-  cov.topLeftCorner(num, num) += llt.solve(Eigen::MatrixXd::Identity(num, num));
+  cov.topLeftCorner(num, num) += llt.inverse();
   PoseChain::Spread spread = system.chain.spread(cov, asked.J);
   SmoothedPath path;
   fill_imu(system, cov, asked, path);

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/panel_loops.h"
 
 namespace alidade {
@@ -198,8 +199,7 @@ PoseChain::Columns PoseChain::solve(const std::vector<Eigen::MatrixXd>& W, int n
   const Eigen::Index num_columns = W.front().cols();
   Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(B.rows(), num_columns);
   if (num_solved > 0) {
-    const Eigen::LLT<Eigen::MatrixXd> llt(B.topLeftCorner(num_solved, num_solved));
-    shared.topRows(num_solved) = llt.solve(border.topRows(num_solved));
+    shared.topRows(num_solved) = Llt(B.topLeftCorner(num_solved, num_solved)).solve_each(border.topRows(num_solved));
   }
   Columns columns{std::vector<Eigen::MatrixXd>(num_poses_), std::vector<Eigen::MatrixXd>(place_of_.size())};
   Eigen::MatrixXd after = Eigen::MatrixXd::Zero(rest_dim, num_columns);

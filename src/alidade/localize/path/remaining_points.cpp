@@ -1,12 +1,12 @@
 #include "alidade/localize/path/remaining_points.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <map>
 #include <optional>
 #include <set>
 #include <unordered_map>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/filter/observation_record.h"
 
 namespace alidade {
@@ -34,9 +34,9 @@ std::optional<Eigen::Vector3d> nearest_to_rays(const SmoothedPath& smoothed, std
     across += off;
     sum += off * pose.translation;
   }
-  const Eigen::LDLT<Eigen::Matrix3d> ldlt(across);
+  const Ldlt ldlt(across);
   constexpr double min_angle2 = 1e-5;  // of what rays differ by, squared
-  if (!(ldlt.vectorD().minCoeff() > min_angle2 * static_cast<double>(looks.size()))) return std::nullopt;
+  if (!(ldlt.min_pivot() > min_angle2 * static_cast<double>(looks.size()))) return std::nullopt;
   return ldlt.solve(sum);
 }
 
@@ -70,10 +70,10 @@ std::optional<PlacedPoint> placed_from(const SmoothedPath& smoothed, std::span<c
     of_poses += J_pose * smoothed.cov[look.frame] * J_pose.transpose();
     ++placed.num_fit;
   }
-  const Eigen::LLT<Eigen::Matrix3d> llt(H);
-  if (placed.num_fit < min_looks || llt.info() != Eigen::Success) return std::nullopt;
+  const Llt llt(H);
+  if (placed.num_fit < min_looks || !llt.is_positive()) return std::nullopt;
   placed.point_in_world = at + llt.solve(g);
-  placed.cov = llt.solve(Eigen::Matrix3d::Identity()) + of_poses / static_cast<double>(placed.num_fit);
+  placed.cov = llt.inverse() + of_poses / static_cast<double>(placed.num_fit);
   if (!placed.point_in_world.allFinite() || !placed.cov.allFinite()) return std::nullopt;
   return placed;
 }

@@ -1,6 +1,5 @@
 #include "alidade/servo/identify/identify_flaws.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
@@ -117,7 +116,7 @@ ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams p
 double log_determinant(const Eigen::MatrixXd& A) {
   const Eigen::VectorXd scale = A.diagonal().cwiseSqrt().cwiseMax(1e-300);
   const Eigen::VectorXd down = scale.cwiseInverse();
-  const Eigen::VectorXd pivots = Eigen::LDLT<Eigen::MatrixXd>(down.asDiagonal() * A * down.asDiagonal()).vectorD();
+  const Eigen::VectorXd pivots = Ldlt(scaled_by(down, A)).pivots();
   return pivots.array().max(1e-300).log().sum() + 2.0 * scale.array().log().sum();
 }
 

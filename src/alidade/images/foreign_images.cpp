@@ -18,6 +18,7 @@ std::string advice_for(const std::string& kind) {
     return "is a camera's raw file: develop it to TIFF or PNG, without correcting the lens or turning it";
   if (kind == "video") return "is a video: take still frames out of it, as PNG";
   if (kind == "PDF") return "is a PDF, not a photo";
+  if (kind == "table") return "is a table, not a photo: corners that were found elsewhere are given by --corners";
   return "is " + kind + ", which is not read: convert it to JPEG or PNG without turning it";
 }
 
@@ -28,6 +29,20 @@ std::string kind_of_brand(std::string_view brand) {
   }
   if (brand == "avif" || brand == "avis") return "AVIF";
   return brand == "crx " ? "raw" : "video";  // Canon's CR3
+}
+
+/// Text whose first two lines have equally many separators.
+bool is_table(std::string_view bytes) {
+  const std::string_view start = bytes.substr(0, 4096);
+  const std::size_t first = start.find('\n'), second = first < start.size() ? start.find('\n', first + 1) : first;
+  if (second >= start.size()) return false;
+  const std::string_view lines = start.substr(0, second);
+  if (std::ranges::any_of(lines, [](char c) { return static_cast<unsigned char>(c) < ' ' && !std::isspace(c); }))
+    return false;
+  return std::ranges::any_of(std::string_view(",;\t"), [&](char separator) {
+    const auto num = std::ranges::count(lines.substr(0, first), separator);
+    return num > 1 && num == std::ranges::count(lines.substr(first), separator);
+  });
 }
 
 std::string kind_of(std::string_view bytes) {
@@ -41,7 +56,8 @@ std::string kind_of(std::string_view bytes) {
   if (at(0, std::string_view("\0\0\0\x0CJXL ", 8)) || at(0, "\xFF\x0A")) return "JPEG XL";
   if (at(0, "FUJIFILMCCD-RAW") || at(0, "IIRO") || at(0, "IIRS") || at(0, "IIU") || at(8, "CR\x02")) return "raw";
   if ((at(0, "II*") || at(0, "MM")) && exif_tags(bytes).is_raw) return "raw";
-  return at(0, "RIFF") && at(8, "AVI ") ? "video" : "";
+  if (at(0, "RIFF") && at(8, "AVI ")) return "video";
+  return is_table(bytes) ? "table" : "";
 }
 
 std::string kind_of_ending(const std::string& ending) {

@@ -7,8 +7,8 @@
 
 namespace alidade {
 
-/// What to do with an image of a kind that is not read (HEIC, AVIF, raw files, GIF, PDF, a video), recognised by its
-/// bytes: "is HEIC, which is not read: convert it to JPEG or PNG without turning it". Empty for all others.
+/// What to do with a file of a kind that is not read (HEIC, AVIF, raw files, GIF, PDF, a video, a table), recognised by
+/// its bytes: "is HEIC, which is not read: convert it to JPEG or PNG without turning it". Empty for all others.
 [[nodiscard]] std::string foreign_image(std::string_view bytes);
 
 /// Whether a file's ending is of such a kind.

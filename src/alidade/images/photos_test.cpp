@@ -154,6 +154,7 @@ TEST(DecodePhoto, SaysWhatToDoWithKindsThatAreNotRead) {
   EXPECT_THAT(refusal(box("mp42")), HasSubstr("is a video"));
   EXPECT_THAT(refusal("GIF89a" + std::string(40, '\0')), HasSubstr("is GIF"));
   EXPECT_THAT(refusal("%PDF-1.7" + std::string(40, '\0')), HasSubstr("is a PDF"));
+  EXPECT_THAT(refusal("image,corner,u_px,v_px\na.png,0,12.5,80.25\n"), HasSubstr("is a table, not a photo"));
 }
 
 TEST(ListPhotos, NothingThereIsSaid) {

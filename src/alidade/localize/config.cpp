@@ -38,6 +38,11 @@ FieldList sigma_fields(LocalizeConfig& config) {
        .value = &config.sigma_scale,
        .help = "σ of the target's size over it, as of a print (0.002: 0.2 %), counted",
        .limits = positive},
+      {.name = "sigma_times_s",
+       .value = &config.sigma_times_s,
+       .help = "σ of the frames' times, the same error for all [s]: counted in each pose by the camera's velocity (0: "
+               "exact, as where the frames themselves are the times)",
+       .limits = {.min = 0.0}},
       {.name = "sigma_a_m_s2",
        .value = &config.filter.sigma_a_m_s2,
        .help = "Acceleration of the camera [m/s2]; by hand about 4",

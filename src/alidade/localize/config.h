@@ -126,11 +126,12 @@ struct LocalizeConfig {
   DistortionVariant distortion = DistortionVariant::full;
   bool calibrate_online = false;  ///< fx fy cx cy k1 k2 p1 p2 are estimated, as far as the lens has them.
   NewPoints new_points = NewPoints::inverse_depth;
-  std::optional<double> depth_m = {};       ///< Of new points of which no depth is given. None: the target's distance.
-  double sigma_depth = 0.5;                 ///< Of those, relative.
-  std::optional<double> sigma_px = {};      ///< Of a pixel coordinate; in images the least of a match. None: 0.5, 0.11.
-  std::optional<double> sigma_scale = {};   ///< Of the target's size, relative: counted. None: the target's own.
-  std::optional<LocalizeStart> start = {};  ///< Else from the target, else the first camera is the world, up to scale.
+  std::optional<double> depth_m = {};      ///< Of new points of which no depth is given. None: the target's distance.
+  double sigma_depth = 0.5;                ///< Of those, relative.
+  std::optional<double> sigma_px = {};     ///< Of a pixel coordinate; in images the least of a match. None: 0.5, 0.11.
+  std::optional<double> sigma_scale = {};  ///< Of the target's size, relative: counted. None: the target's own.
+  std::optional<double> sigma_times_s = {};  ///< Of the frames' times, the same for all. 0: exact. None: not known.
+  std::optional<LocalizeStart> start = {};   ///< Else from the target, else the first camera is the world, up to scale.
   LocalizeTarget target = {};
   std::optional<SavedMap> map = {};  ///< Of an earlier run, to begin in, instead of a target; its frame is the path's.
   std::vector<DepthReading> depth_readings = {};  ///< In order of time: scale without a target, else a check of it.

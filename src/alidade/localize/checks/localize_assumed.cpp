@@ -87,7 +87,8 @@ std::vector<Assumption> localize_assumed(const Localization& report) {
     each.moved = std::string(given.moved);
     each.moved_by = given.moved_by * error;
     each.remedy = is_scale   ? "give --sigma-scale, or σ in --target: sigma_m of each point, sigma_square_m of a board"
-                  : is_clock ? "take times at the centre of each exposure: no observation says when it was"
+                  : is_clock ? "take times at the centre of each exposure, and give their error: --sigma-times (0 "
+                               "where it does not matter)"
                   : is_port  ? remedy_port
                              : remedy_camera;
     assumed.push_back(each);

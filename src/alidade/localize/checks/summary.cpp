@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <vector>
 
+#include "alidade/geometry/so3.h"
 #include "alidade/localize/path/path_error.h"
 
 namespace alidade {
@@ -34,6 +36,29 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     if (!result.is_of_images && feature.is_known && num_used(feature.id) == 0) continue;  // given, never seen
     const auto place = filter.place(feature.id);
     result.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
+  }
+}
+
+void widen_by_times(double sigma_s, Localization& result) {
+  const std::vector<PathStep>& path = result.path;
+  std::vector<Eigen::Vector<double, 6>> twists;
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const PathStep& before = k > 0 && path[k - 1].has_pose() ? path[k - 1] : path[k];
+    const PathStep& after = k + 1 < path.size() && path[k + 1].has_pose() ? path[k + 1] : path[k];
+    Eigen::Vector<double, 6> twist = Eigen::Vector<double, 6>::Zero();
+    if (const double dt_s = after.t_s - before.t_s; path[k].has_pose() && dt_s > 0.0) {
+      const Rigid3 one = before.world_from_cam, other = after.world_from_cam;
+      twist << path[k].world_from_cam.rotation.conjugate() * (other.translation - one.translation) / dt_s,
+          log_so3(one.rotation.conjugate() * other.rotation) / dt_s;
+    }
+    twists.push_back(twist);
+  }
+  for (std::size_t k = 0; k < path.size(); ++k)
+    result.path[k].cov += sigma_s * sigma_s * twists[k] * twists[k].transpose();
+  for (GivenNumber& clock : result.given) {
+    if (clock.name != "clock") continue;
+    clock.moves /= std::hypot(1.0, clock.moves * sigma_s);
+    clock.sigma = sigma_s;
   }
 }
 

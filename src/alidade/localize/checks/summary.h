@@ -14,6 +14,10 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
 /// With truth: how far the path is from it.
 void add_path_error(Localization& result);
 
+/// Adds to the poses' covariances what the σ of the frames' times, all of them late by the same, moves them by: their
+/// velocity, in each pose's frame by its neighbours, times σ [s].
+void widen_by_times(double sigma_s, Localization& result);
+
 /// Whether most poses are on the side of a flat target, in the world's x and y, from which it is not seen: as where it
 /// or the images are mirrored. A target is seen from its −z.
 [[nodiscard]] bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> target, bool seen_from_plus_z);

@@ -1,8 +1,8 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/spot/spot_fit.h"
 
 namespace alidade {
@@ -247,7 +247,7 @@ EdgeSolution best_edges(const EdgeFit& fit, const Vector7& start) {
       Matrix7 damped = best.normal;
       damped.diagonal() *= 1.0 + damping;
       damped.diagonal().array() += 1e-9;
-      const Vector7 step = -damped.ldlt().solve(gradient);
+      const Vector7 step = -solve_symmetric(damped, gradient);
       const Eigen::VectorXd next = fit.residuals(best.p + step);
       is_better = next.squaredNorm() < best.cost;
       best.converged = step.head<2>().norm() < 1e-3 && (is_better || damping > 1e4);
@@ -308,7 +308,7 @@ SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start) {
   SpotPlace spot = start;
   spot.px = solution.p.head<2>();
   spot.radius_px = radius_px;
-  const Matrix7 inverse = solution.normal.ldlt().solve(Matrix7::Identity());
+  const Matrix7 inverse = inverse_symmetric(solution.normal);
   spot.cov = std::max(1.0, fit.shared_gain(solution.p) * solution.cost / dof) * inverse.topLeftCorner<2, 2>();
   spot.cov += missed_by_model(signal, start, moved, radius_px);
   if (!spot.cov.allFinite()) return with_wide_sigma(start);

@@ -1,5 +1,3 @@
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/imu/imu_alignment.h"
 #include "alidade/localize/path/path_system.h"
 
@@ -61,13 +60,13 @@ struct LargerWalk {
   double factor = 1.0, gain = 0.0;
 };
 LargerWalk larger_walk(const Walked& walked) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(walked.cov);
-  const Eigen::VectorXd along = of.eigenvectors().transpose() * walked.by;
+  const SymmetricEigen of = symmetric_eigen(walked.cov);
+  const Eigen::VectorXd along = of.vectors.transpose() * walked.by;
   const auto cost_of = [&](double factor) {
     constexpr double hardly = 1e-6;
     double cost = 0.0;
     for (Eigen::Index i = 0; i < along.size(); ++i) {
-      const double k = std::clamp(of.eigenvalues()[i], hardly, 1.0 - hardly);
+      const double k = std::clamp(of.values[i], hardly, 1.0 - hardly);
       const double variance = k / (1.0 - k) + factor;
       cost += square_of(along[i] / (1.0 - k)) / variance + std::log(variance);
     }
@@ -262,9 +261,9 @@ bool PathSmoother::choose_walks() {
   const auto system = build(state_, Shared::solved);
   if (!system) return false;
   const int num = num_solved();
-  const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
-  if (llt.info() != Eigen::Success) return false;
-  const Eigen::MatrixXd cov = llt.solve(Eigen::MatrixXd::Identity(num, num)).topLeftCorner(lens_at_, lens_at_);
+  const Llt llt(system->chain.B.topLeftCorner(num, num));
+  if (!llt.is_positive()) return false;
+  const Eigen::MatrixXd cov = llt.inverse().topLeftCorner(lens_at_, lens_at_);
   const ImuState& is = state_.imu;
   const auto num_spans = static_cast<Eigen::Index>(is.node_t_s.size()) - 1;
   bool is_other = false;

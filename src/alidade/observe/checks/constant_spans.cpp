@@ -1,10 +1,10 @@
 #include "alidade/observe/checks/constant_spans.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/observe/solve/solve_once.h"
 
 namespace alidade {
@@ -109,8 +109,8 @@ std::optional<Disagreement> disagreement_of(const ObserveReport& a, const Observ
   if (size <= 0 || a.covariance.rows() < from + size || b.covariance.rows() < from + size) return std::nullopt;
   const Eigen::VectorXd difference = difference_of(a, b, from, size);
   const Eigen::MatrixXd cov = a.covariance.block(from, from, size, size) + b.covariance.block(from, from, size, size);
-  const Eigen::LDLT<Eigen::MatrixXd> solved(cov);
-  if (!cov.allFinite() || !solved.isPositive()) return std::nullopt;
+  const Ldlt solved(cov);
+  if (!cov.allFinite() || !solved.is_positive()) return std::nullopt;
   if (!(difference.dot(solved.solve(difference)) > chi2_quantile(static_cast<int>(size), agree_within)))
     return std::nullopt;
   Disagreement found;
@@ -170,7 +170,7 @@ Eigen::Array4d errors_by_the_rest(const ObserveSolution& span, const ObserveSolu
       std::ranges::equal(span.quantities, other.quantities, {}, &ObservedQuantity::name, &ObservedQuantity::name);
   if (size <= 0 || !is_same || !span.covariance.allFinite()) return Eigen::Array4d::Zero();
   const Eigen::VectorXd difference = difference_of(span, other, num_intrinsics, size);
-  const Eigen::LDLT<Eigen::MatrixXd> rest(span.covariance.bottomRightCorner(size, size));
+  const Ldlt rest(span.covariance.bottomRightCorner(size, size));
   return (span.covariance.topRightCorner(num_intrinsics, size) * rest.solve(difference)).array().abs();
 }
 

@@ -1,11 +1,11 @@
 #include "alidade/observe/checks/frame_places.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/observe/rotation_frame.h"
 #include "alidade/observe/setup.h"
@@ -28,7 +28,7 @@ Eigen::Matrix<double, Num, 1> solved(const Eigen::Matrix<double, Num, Num>& A, c
   const double size = A.trace() / Num;
   Eigen::Matrix<double, Num, Num> damped = A;
   damped.diagonal().array() += hardly * size + 1e-300;
-  return damped.ldlt().solve(b);
+  return solve_symmetric(damped, b);
 }
 
 class Places {

@@ -280,8 +280,8 @@ StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNui
   const double wanted = duration_s / std::max(correlations_a_block * stated.correlation_s, 1e-9);
   const int frames_allow = static_cast<int>(reference.bundle.frames.size() / 3);
   const int num_blocks = std::min(static_cast<int>(std::clamp<double>(wanted, min_blocks, max_blocks)), frames_allow);
-  const Eigen::LLT<MatrixXd> llt(model);
-  if (num_blocks < 3 || llt.info() != Eigen::Success) return stated;
+  const Llt llt(model);
+  if (num_blocks < 3 || !llt.is_positive()) return stated;
   stated.block_s = duration_s / num_blocks;
   const Parts parts = parts_of(reference, nuisances, num_blocks, errors);
   // Of the noise, than the residuals show: what the bearings take of white noise is counted already.
@@ -299,7 +299,7 @@ StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNui
     steps.push_back({model * part.gradient, more * model * part.information * model});
   }
   stated.blocks = cluster_covariance(within, 1.0, steps);
-  const MatrixXd L = llt.matrixL();
+  const MatrixXd L = llt.lower();
   stated.cov = stated.lasting + made_positive(stated.blocks.cov - within) +
                L * made_positive(track_excess(parts, more * parts.lasting, L, stated)) * L.transpose();
   stated.inflation = (stated.cov.diagonal().array() / model.diagonal().array()).sqrt();

@@ -145,7 +145,7 @@ void add_fixed_centre(const ObserveSetup& config, const ObserveSolution& report,
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d pull = -information.block<2, 1>(0, 2 + axis) * (ordinary_centre_px / report.scale.scale);
     Eigen::Vector4d move = Eigen::Vector4d::Zero();
-    move.head<2>() = free.ldlt().solve(pull);
+    move.head<2>() = solve_symmetric(free, pull);
     Assumption assumption{
         .name = axis == 0 ? "cx fixed" : "cy fixed",
         .value = report.quantities.empty() ? not_seen : report.quantities[2 + static_cast<std::size_t>(axis)].value,

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <string>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/track/checks/explanation.h"
 
 namespace alidade {
@@ -54,14 +55,14 @@ std::optional<Jump> jump_between(const Sides& sides, const Eigen::Vector3d& grav
   double t_s = 0.5 * (sides.before->t_s + sides.after->t_s);
   for (int step = 0; step < num_steps; ++step) {
     const Belief<6> apart = apart_at(sides, t_s, gravity_m_s2);
-    const auto weight = apart.P.topLeftCorner<3, 3>().eval().ldlt();
-    const Eigen::Vector3d x = apart.x.head<3>(), v = apart.x.tail<3>(), weighted = weight.solve(v);
+    const Eigen::Vector3d x = apart.x.head<3>(), v = apart.x.tail<3>();
+    const Eigen::Vector3d weighted = solve_symmetric(apart.P.topLeftCorner<3, 3>(), v);
     t_s = std::clamp(t_s - x.dot(weighted) / v.dot(weighted), sides.before->t_s, sides.after->t_s);
   }
   const Belief<6> apart = apart_at(sides, t_s, gravity_m_s2);
   const Eigen::Vector3d x = apart.x.head<3>(), v = apart.x.tail<3>();
-  const double distance2 = x.dot(apart.P.topLeftCorner<3, 3>().eval().ldlt().solve(x));
-  const double speed2 = v.dot(apart.P.bottomRightCorner<3, 3>().eval().ldlt().solve(v));
+  const double distance2 = squared_mahalanobis(x, apart.P.topLeftCorner<3, 3>());
+  const double speed2 = squared_mahalanobis(v, apart.P.bottomRightCorner<3, 3>());
   if (!(distance2 < chi2_3_at_999) || !(speed2 > min_sigma * min_sigma)) return std::nullopt;
   return Jump{t_s, v.norm()};
 }

@@ -52,11 +52,12 @@ demo: build
 	@echo "demo: $(out)/alidade calibrate build/demo/photos/left*.jpg --board 9x6 --square 0.025 --out build/demo/result"
 	@$(out)/alidade calibrate build/demo/photos/left*.jpg --board 9x6 --square 0.025 --out build/demo/result
 
+# What the tests start beside them (a browser, mpirun, INDI) is installed while they compile.
 test:
-	@tools/setup build test
+	@tools/setup build test-build
 	@echo "test: building the tests in $(out)"
 	@cmake --preset release -DALIDADE_TESTS=ON >/dev/null
-	@ninja -C $(out) $(jobs)
+	@tools/setup test & setup=$$!; ninja -C $(out) $(jobs) || { wait $$setup; exit 1; }; wait $$setup
 	@echo "test: running them"
 	@# Two more than there are cores: those that drive a browser or a simulated head wait most of the time.
 	@ctest --test-dir $(out) --output-on-failure --parallel $$(($$(nproc) + 2))
@@ -84,7 +85,7 @@ faults: build
 # Tests of one program under the other sanitizers know nothing of each other: one after the other. What Debian's oneTBB
 # orders the thread sanitizer does not see; on one processor it starts no threads, all others of the tests remain.
 sanitize:
-	@tools/setup build test
+	@tools/setup build test-build test
 	@for preset in asan tsan; do \
 	  echo "sanitize: $$preset" && cmake --preset $$preset -DALIDADE_TESTS=ON -DALIDADE_WEB=OFF >/dev/null && \
 	  ninja -C build/$$preset $(jobs) && on=$$(test $$preset = asan || echo taskset -c 0) && \
@@ -190,7 +191,7 @@ format:
 	@git ls-files '*.h' '*.cpp' | xargs clang-format-14 -i
 
 tidy:
-	@tools/setup build test tidy
+	@tools/setup build test-build test tidy
 	@tools/check_tidy
 
 clean:

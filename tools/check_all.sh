@@ -2,7 +2,7 @@
 # Everything that must hold before a change is done: format, layers, frames, a build with sanitizers, tests, tidy.
 set -eu
 cd "$(dirname "$0")/.."
-tools/setup build test tidy
+tools/setup build test-build test tidy
 tools/check_format
 python3 tools/check_layers.py src/alidade
 python3 tools/check_frames.py src cli

@@ -1,72 +1,27 @@
 #include <gtest/gtest.h>
 
-#include "alidade/geometry/similarity.h"
-#include "alidade/localize.h"
-#include "alidade/simulate/draws.h"
-#include "alidade/simulate/imu/imu_readings.h"
-#include "alidade/simulate/underwater.h"
+#include <cmath>
+
+#include "alidade/testing/imu_run.h"
 
 // An IMU whose biases drift, or whose clock runs fast.
 
 namespace alidade {
 namespace {
 
-struct DriftRun {
-  Camera camera;
-  std::vector<ObservationFrame> frames;
-  std::vector<TimedPose> truth;
-  Imu imu;
-};
+using testing::ImuRun;
 
-/// A camera that swings before points for 16 s; the mounting and the scale factor are off by their σ.
-DriftRun recorded(std::uint64_t seed) {
-  Draws draws(seed + 70);
-  ImuScene scene;
-  scene.force_scale = scene.noise.sigma_force_scale * draws.normal();
-  UnderwaterScene world;
-  world.camera = underwater_camera();
-  world.num_points = 60;
-  world.num_frames = 320;
-  world.dt_s = 1.0 / 20.0;
-  const UnderwaterSequence sequence = simulate_underwater(world, seed);
-  DriftRun run{world.camera, {}, {}, {}};
-  for (const UnderwaterFrame& frame : sequence.frames) {
-    ObservationFrame seen{static_cast<long>(run.frames.size()), frame.t_s, {}};
-    for (const UnderwaterObservation& observation : frame.observations)
-      seen.observations.push_back({observation.id, observation.px, 0.0});
-    run.truth.push_back({frame.t_s, frame.world_from_cam});
-    run.frames.push_back(std::move(seen));
-  }
-  ImuMounting given = scene.mounting;
-  given.cam_from_imu.rotation = exp_so3(given.sigma_rotation_rad * draws.normal3()) * given.cam_from_imu.rotation;
-  given.cam_from_imu.translation += given.sigma_position_m * draws.normal3();
-  run.imu = {
-      .readings = simulate_imu(scene, sequence.world_from_cam, -0.5, run.truth.back().t_s + 0.5, seed + 100).readings,
-      .mounting = given,
-      .noise = scene.noise};
-  run.imu.gravity_m_s2 = scene.gravity_in_world.norm();
-  return run;
-}
+/// 16 s, so that what drifts is seen.
+ImuRun recorded(std::uint64_t seed) { return testing::swinging(seed, {}, 320, 1.0 / 20.0); }
 
 struct Drifted {
   Localization result;
-  double worst = 0.0;  ///< Largest error of a position over its σ, once the path stands in the frame of the truth.
+  double worst = 0.0;  ///< testing::worst_sigmas().
 };
 
-Drifted localized(const DriftRun& run) {
-  LocalizeConfig config;
-  config.imu = run.imu;
-  Drifted drifted{localize(run.frames, run.camera, config, run.truth)};
-  std::vector<Eigen::Vector3d> truth, path;
-  for (std::size_t k = 0; k < run.truth.size(); ++k) {
-    truth.push_back(run.truth[k].world_from_cam.translation);
-    path.push_back(drifted.result.path[k].world_from_cam.translation);
-  }
-  const auto to_truth = aligned(path, truth, true);
-  for (std::size_t k = 0; k < path.size(); ++k) {
-    const double sigma = std::sqrt(drifted.result.path[k].cov.topLeftCorner<3, 3>().trace());
-    drifted.worst = std::max(drifted.worst, (to_truth->b_from_a * path[k] - truth[k]).norm() / sigma);
-  }
+Drifted localized(const ImuRun& run) {
+  Drifted drifted{localize(run.frames, run.camera, testing::with_imu(run), run.truth)};
+  drifted.worst = testing::worst_sigmas(drifted.result, run);
   return drifted;
 }
 
@@ -88,7 +43,7 @@ TEST(ImuDrift, OfAnImuAsItShouldBeNothingIsNamed) {
 TEST(ImuDrift, ABiasThatDriftsIsEstimatedAndNamed) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     for (const bool is_of_rates : {false, true}) {
-      DriftRun run = recorded(seed);
+      ImuRun run = recorded(seed);
       for (ImuReading& each : run.imu.readings)
         (is_of_rates ? each.rate_rad_s : each.force_m_s2).x() += (is_of_rates ? 0.001 : 0.015) * each.t_s;
       const Drifted drifted = localized(run);
@@ -107,7 +62,7 @@ TEST(ImuDrift, ABiasThatDriftsIsEstimatedAndNamed) {
 /// 0.3 % fast: 24 ms at either end of 16 s were another lens, other axes, and 8 to 25σ.
 TEST(ImuDrift, AClockThatRunsFastIsFoundAndNamed) {
   for (const double rate : {-0.003, 0.001, 0.003}) {
-    DriftRun run = recorded(5);
+    ImuRun run = recorded(5);
     for (ImuReading& each : run.imu.readings) each.t_s = (1.0 + rate) * each.t_s + 0.02;
     const Drifted fast = localized(run);
     ASSERT_TRUE(fast.result.imu);

@@ -134,7 +134,7 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
   else if (run.of_observations)
     run.of_observations->sum_up(result);
   add_scale(run.config, result);
-  if (run.config.sigma_times_s) widen_by_times(*run.config.sigma_times_s, result);
+  if (const auto sigma_s = sigma_of_times(run.config, result)) widen_by_times(*sigma_s, result);
   result.saved_map.is_in_metres = result.scale_known;
   if (run.of_images)
     run.of_images->save_map(result);

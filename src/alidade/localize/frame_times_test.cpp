@@ -6,6 +6,7 @@
 
 #include "alidade/localize.h"
 #include "alidade/simulate/underwater.h"
+#include "alidade/testing/imu_run.h"
 
 // The σ of the frames' times.
 
@@ -65,6 +66,29 @@ TEST(FrameTimes, ThatAreExactChangeNothing) {
   for (std::size_t k = 0; k < exact.path.size(); ++k) EXPECT_EQ(exact.path[k].cov, none.path[k].cov) << k;
   ASSERT_NE(times_of(exact), nullptr);
   EXPECT_EQ(times_of(exact)->sigma, 0.0);
+}
+
+/// An IMU has a clock of its own: where the two agree, the times are known as well as they do.
+TEST(FrameTimes, AnImuShowsWhetherTheyAreRight) {
+  for (const double late_s : {0.0, -0.02, 0.02}) {
+    ImuScene scene;
+    scene.late_s = late_s;
+    const testing::ImuRun run = testing::swinging(3, scene);
+    LocalizeConfig config = testing::with_imu(run);
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    ASSERT_TRUE(result.imu);
+    ASSERT_EQ(result.imu->fault, ImuFault::none) << result.verdict.sentence;
+    const Assumption* times = times_of(result);
+    ASSERT_NE(times, nullptr);
+    EXPECT_EQ(times->sigma.has_value(), late_s == 0.0);
+    EXPECT_LT(times->sigma.value_or(0.0), 0.001);
+    const bool is_named = result.verdict.sentence.find("the IMU's clock is 0.0") != std::string::npos;
+    EXPECT_EQ(is_named, late_s != 0.0) << result.verdict.sentence;
+    EXPECT_EQ(result.verdict.state, late_s == 0.0 ? State::good : State::care) << result.verdict.sentence;
+    if (late_s <= 0.0) continue;
+    config.sigma_times_s = 0.0;
+    EXPECT_EQ(localize(run.frames, run.camera, config, run.truth).verdict.state, State::good);
+  }
 }
 
 }  // namespace

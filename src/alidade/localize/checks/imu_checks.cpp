@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "alidade/geometry/degree.h"
@@ -123,6 +124,15 @@ void add_drifts(const ImuEstimate& imu, Verdict& verdict) {
 
 }  // namespace
 
+bool clocks_differ(const Localization& report) {
+  constexpr double apart = 3.5, ordinary_s = 0.005;  // as stamps at the begin of an exposure are
+  const auto clock = std::ranges::find(report.given, "clock", &GivenNumber::name);
+  if (!report.imu || clock == report.given.end() || clock->sigma == 0.0) return false;
+  const double late = std::abs(report.imu->late_s),
+               sigma = std::hypot(report.imu->sigma_late_s, clock->sigma.value_or(0.0));
+  return late > ordinary_s && late > apart * sigma && late * clock->moves > 1.0;
+}
+
 /// Of readings that are used: what of them is not as given.
 void add_imu(const Localization& report, Verdict& verdict) {
   if (!report.imu || report.imu->fault != ImuFault::none) return;
@@ -144,11 +154,14 @@ void add_imu(const Localization& report, Verdict& verdict) {
                      100.0 * imu.axes_differ, imu.axes_sigmas),
          imu.axes_sigmas, apart, "σ", "path"});
   const double late = std::abs(imu.late_s);
-  if (late > imu.frame_period_s)
-    verdict.checks.push_back({"IMU clock", State::care,
-                              fmt::format("the IMU's clock is {:.3g} s {} the camera's, {:.2g} frames: corrected", late,
-                                          imu.late_s > 0.0 ? "after" : "before", late / imu.frame_period_s),
-                              late, imu.frame_period_s, "s", "path"});
+  if (late > imu.frame_period_s || clocks_differ(report))
+    verdict.checks.push_back(
+        {"IMU clock", State::care,
+         fmt::format(
+             "the IMU's clock is {:.3g} s {} the camera's, {:.2g} frames: corrected; or are the frames' times {}?",
+             late, imu.late_s > 0.0 ? "after" : "before", late / imu.frame_period_s,
+             imu.late_s > 0.0 ? "early" : "late"),
+         late, std::min(late, imu.frame_period_s), "s", "path"});
   add_drifts(imu, verdict);
   const double num = static_cast<double>(imu.num_steps + imu.num_rejected + imu.num_missing);
   const double missing = static_cast<double>(imu.num_missing) / num,

@@ -16,6 +16,9 @@ namespace alidade {
 
 /// Why an IMU's readings have no part in the path; empty where they have.
 [[nodiscard]] std::string imu_fault_text(const ImuEstimate& imu);
+/// Whether an IMU's clock and the frames' times are apart by more than is ordinary, and by more than moves a pose by σ:
+/// which of them is wrong is not known.
+[[nodiscard]] bool clocks_differ(const Localization& report);
 /// Checks of those that have.
 void add_imu(const Localization& report, Verdict& verdict);
 

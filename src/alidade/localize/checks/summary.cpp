@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/geometry/so3.h"
+#include "alidade/localize/checks/judge.h"
 #include "alidade/localize/path/path_error.h"
 
 namespace alidade {
@@ -37,6 +38,12 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     const auto place = filter.place(feature.id);
     result.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
   }
+}
+
+std::optional<double> sigma_of_times(const LocalizeConfig& config, const Localization& result) {
+  if (config.sigma_times_s) return config.sigma_times_s;
+  if (!result.imu || result.imu->fault != ImuFault::none || clocks_differ(result)) return std::nullopt;
+  return std::hypot(result.imu->sigma_late_s, result.imu->late_s);
 }
 
 void widen_by_times(double sigma_s, Localization& result) {

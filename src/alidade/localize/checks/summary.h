@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "alidade/localize/filter/filter_bank.h"
 #include "alidade/localize/path/path_smoother.h"
@@ -13,6 +14,10 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
 
 /// With truth: how far the path is from it.
 void add_path_error(Localization& result);
+
+/// Of the frames' times [s], the same error for all: as given, else by how much an IMU's clock is off them. None: not
+/// known, or which of the two clocks is wrong is not.
+[[nodiscard]] std::optional<double> sigma_of_times(const LocalizeConfig& config, const Localization& result);
 
 /// Adds to the poses' covariances what the σ of the frames' times, all of them late by the same, moves them by: their
 /// velocity, in each pose's frame by its neighbours, times σ [s].

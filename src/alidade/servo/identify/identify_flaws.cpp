@@ -62,6 +62,13 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
   return next;
 }
 
+/// Whether a step up leaves a flaw where its range ends.
+bool is_at_upper_end(const ServoFit& fit, Index param) {
+  if (param < num_servo_params) return false;
+  const double ServoFlaws::*size = servo_flaws[fit.freed[static_cast<std::size_t>(param - num_servo_params)]];
+  return moved(fit, param, 1e-4).flaws.*size == fit.flaws.*size;
+}
+
 /// By how much a parameter is moved for a difference.
 double step_of(std::span<const ServoSample> log, const ServoFit& fit, Index param) {
   const double spacing_s = (log.back().t_s - log.front().t_s) / static_cast<double>(log.size());
@@ -94,6 +101,24 @@ Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const Serv
     const ServoFit more = moved(fit, k, step), less = moved(fit, k, is_at_edge ? 0.0 : -step);
     J.col(k) = (flawed_response(log, more, more.flaws) - flawed_response(log, less, less.flaws)) /
                (is_at_edge ? step : 2.0 * step);
+  }
+  return J;
+}
+
+/// The same by differences to one side of a fit whose misfit is known: half the work, for steps of a descent.
+Eigen::MatrixXd jacobian_of_steps(std::span<const ServoSample> log, const Eigen::VectorXd& readings,
+                                  const ServoFit& fit, const Eigen::VectorXd& misfit) {
+  const auto num = static_cast<Index>(num_servo_params + fit.freed.size());
+  const Eigen::VectorXd here = misfit + readings;
+  Eigen::MatrixXd J(readings.size(), num);
+  for (Index k = 0; k < num; ++k) {
+    if (k == ServoParam::zero) {
+      J.col(k).setOnes();
+      continue;
+    }
+    const double step = is_at_upper_end(fit, k) ? -step_of(log, fit, k) : step_of(log, fit, k);
+    const ServoFit there = moved(fit, k, step);
+    J.col(k) = (flawed_response(log, there, there.flaws) - here) / step;
   }
   return J;
 }
@@ -155,13 +180,14 @@ double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& 
     for (Index k = 0; k < step.size(); ++k) next = moved(next, k, step[k]);
     return next;
   };
+  const Eigen::VectorXd readings = readings_of(log);
   const LevenbergOutcome descent = levenberg(
       {.max_steps = max_steps, .first_damping = 1e-4, .tolerance = 1e-9, .ridge = 1e-18}, fit,
-      [&](const ServoFit& at) { return flawed_misfit(log, at); },
-      [&](const ServoFit& at) { return jacobian_by_factors(log, at); }, after);
+      [&](const ServoFit& at) -> Eigen::VectorXd { return flawed_response(log, at, at.flaws) - readings; },
+      [&](const ServoFit& at, const Eigen::VectorXd& misfit) { return jacobian_of_steps(log, readings, at, misfit); },
+      after);
   fit.has_converged = descent.has_converged;
-  const double dof =
-      static_cast<double>(readings_of(log).size()) - num_servo_params - static_cast<double>(fit.freed.size());
+  const double dof = static_cast<double>(readings.size()) - num_servo_params - static_cast<double>(fit.freed.size());
   fit.rms_rad = std::sqrt(descent.sum2 / std::max(1.0, dof));
   return descent.sum2;
 }

@@ -31,13 +31,14 @@ struct LevenbergOutcome {
 };
 
 /// Lowers |misfit(state)|² from `state` on by damped Gauss–Newton steps, state = after(state, step).
+/// `jacobian_at(state, misfit)`: one of differences takes them from the misfit that is known there.
 /// K. Levenberg, "A method for the solution of certain non-linear problems in least squares", 1944, with the scaling of
 /// D. W. Marquardt, 1963.
 template <class State, class Misfit, class Jacobian, class After>
 LevenbergOutcome levenberg(const LevenbergConfig& config, State& state, const Misfit& misfit_at,
                            const Jacobian& jacobian_at, const After& after) {
   Eigen::VectorXd misfit = misfit_at(state);
-  auto J = jacobian_at(state);
+  auto J = jacobian_at(state, misfit);
   LevenbergOutcome outcome{misfit.squaredNorm(), false};
   double damping = config.first_damping, before2 = outcome.sum2;
   for (int i = 0; i < config.max_steps && !outcome.has_converged; ++i) {
@@ -58,7 +59,7 @@ LevenbergOutcome levenberg(const LevenbergConfig& config, State& state, const Mi
     misfit = std::move(tried);
     outcome.sum2 = tried2;
     damping = std::max(1e-9, 0.1 * damping);
-    if (!outcome.has_converged) J = jacobian_at(state);
+    if (!outcome.has_converged) J = jacobian_at(state, misfit);
   }
   const double still2 = 1e-4 * outcome.sum2 / std::max(1.0, static_cast<double>(misfit.size()));
   outcome.has_converged |= config.max_steps >= LevenbergConfig::last_steps && before2 - outcome.sum2 <= still2;

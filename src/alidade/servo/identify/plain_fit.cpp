@@ -100,7 +100,7 @@ ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams p
   const LevenbergOutcome descent = levenberg(
       {.max_steps = 60, .first_damping = 1e-6, .tolerance = 1e-12}, params,
       [&](const ServoParams& at) -> Eigen::VectorXd { return servo_response(log, kind, at).angle_rad - readings; },
-      [&](const ServoParams& at) { return servo_response(log, kind, at).J; },
+      [&](const ServoParams& at, const Eigen::VectorXd&) { return servo_response(log, kind, at).J; },
       [](const ServoParams& from, const auto& step) { return within_meaning(from, ServoParams(from + step)); });
   ServoFit fit;
   fit.kind = kind;

@@ -130,7 +130,7 @@ double PositionerProblem::solve(PositionerVector& theta, const std::vector<int>&
   const LevenbergConfig config{.max_steps = max_steps, .first_damping = 1e-3, .tolerance = 1e-5, .ridge = 1e-16};
   return levenberg(
              config, theta, [&](const PositionerVector& at) { return misfit(at); },
-             [&](const PositionerVector& at) { return jacobian(at, free); }, after)
+             [&](const PositionerVector& at, const Eigen::VectorXd&) { return jacobian(at, free); }, after)
       .sum2;
 }
 

@@ -197,19 +197,21 @@ class TrackEngine {
       if (entry(i).observation.head != head) continue;
       const auto other = other_before(i);
       if (!other) continue;
-      auto filter = begun(entry(*other).observation, entry(i).observation);
+      int enough = more, new_takes = 2;
+      for (std::size_t k = *other; k < place; ++k) enough += entry(k).accepted ? 1 : 0;
+      const auto may_be_enough = [&](std::size_t last) { return new_takes + static_cast<int>(place - last) >= enough; };
+      if (!may_be_enough(i)) continue;
+      const auto filter = begun(entry(*other).observation, entry(i).observation);
       if (!filter) continue;
-      int old_takes = 0, new_takes = 2;
-      for (std::size_t k = *other; k < place; ++k) old_takes += entry(k).accepted ? 1 : 0;
       Entry trial;
       trial.filter = *filter;
-      for (std::size_t k = i + 1; k <= place; ++k) {
+      for (std::size_t k = i + 1; k <= place && may_be_enough(k - 1); ++k) {
         trial.filter.predict(models_, entry(k).observation.t_capture_s - entry(k - 1).observation.t_capture_s);
         trial.observation = entry(k).observation;
         TrackStep ignored;
         new_takes += use(trial, ignored) == TrackEvent::none ? 1 : 0;
       }
-      if (new_takes < old_takes + more) continue;
+      if (new_takes < enough) continue;
       set_begun(place, *other, trial.filter);
       return true;
     }

@@ -78,7 +78,7 @@ BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches
       add_costs(track_target(shifted, heads, plain), shifted, plain.tracker.gate, s, stretches.size() == 1, costs, nis,
                 num);
     }
-    if (!(costs.sum() < least)) continue;
+    if (!(costs.sum() < least)) break;  // the likelihood of a manoeuvre's size has one top
     least = costs.sum();
     best = costs;
     best.nis_per_dof = num > 0.0 ? nis / num : std::numeric_limits<double>::infinity();

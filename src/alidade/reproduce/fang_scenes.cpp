@@ -10,19 +10,18 @@
 namespace alidade::reproduce {
 namespace {
 
-/// The least height of any triangle among the points. [px]
-double min_height_px(const std::vector<Eigen::Vector2d>& p) {
-  double least = std::numeric_limits<double>::infinity();
+/// Whether no triangle among the points is lower.
+bool are_at_least_high(const std::vector<Eigen::Vector2d>& p, double height_px) {
   for (std::size_t i = 0; i < p.size(); ++i) {
     for (std::size_t j = i + 1; j < p.size(); ++j) {
       for (std::size_t k = j + 1; k < p.size(); ++k) {
         const Eigen::Vector2d ab = p[j] - p[i], ac = p[k] - p[i];
         const double area2 = std::abs(ab.x() * ac.y() - ab.y() * ac.x());
-        least = std::min(least, area2 / std::max({ab.norm(), ac.norm(), (p[k] - p[j]).norm()}));
+        if (area2 < height_px * std::max({ab.norm(), ac.norm(), (p[k] - p[j]).norm()})) return false;
       }
     }
   }
-  return least;
+  return true;
 }
 
 bool is_within(double t_s, double from_s, double to_s) { return t_s > from_s - 1e-9 && t_s < to_s + 1e-9; }
@@ -64,7 +63,7 @@ std::vector<Eigen::Vector2d> draw_set(std::uint64_t seed, int num_points) {
       const double x = draws.uniform(60.0, 720.0), y = draws.uniform(60.0, 522.0);
       points.emplace_back(x, y);
     }
-    if (min_height_px(points) >= 40.0) return points;
+    if (are_at_least_high(points, 40.0)) return points;
   }
 }
 

@@ -34,7 +34,7 @@ export async function opensAndDraws({open, urlOf, documents}, name) {
   const {document} = documents[name], isRefused = name.endsWith('refused');
   for (const [width, theme] of [[1500, 'light'], [600, 'dark']]) {
     const {page, faults, close} = await open(urlOf(name), {width, theme});
-    await settled(page);
+    await settled(page, {whole: theme === 'light'});
     assert.deepEqual(faults, []);
     assert.equal(await page.locator('[data-failed]').count(), 0, 'a figure failed');
     const heading = await page.locator('h1').innerText();

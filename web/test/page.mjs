@@ -53,15 +53,15 @@ export async function opened(browser, url, {width = 1280, height = 900, theme = 
   return {page, faults, close: () => context.close()};
 }
 
-/** Draws all 3-D figures, also those far from the window, and waits for two frames. */
-export async function settled(page) {
-  await page.evaluate(async () => {
+/** Draws all 3-D figures, also those far from the window, and waits for two frames; `whole`: scrolls through the page, for thumbnails are decoded in sight. */
+export async function settled(page, {whole = false} = {}) {
+  await page.evaluate(async (all) => {
     for (const view of window.alidade.views3 ?? []) view.wake();
-    for (let y = 0; y < document.body.scrollHeight; y += 600) { // thumbnails are decoded in sight
+    for (let y = 0; all && y < document.body.scrollHeight; y += 600) {
       scrollTo(0, y);
       await new Promise((done) => requestAnimationFrame(done));
     }
     scrollTo(0, 0);
     for (let i = 0; i < 3; ++i) await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 20)));
-  });
+  }, whole);
 }

@@ -8,6 +8,6 @@ const browser = await launch();
 const page = await browser.newPage({viewport: {width, height}, deviceScaleFactor: Number(scale), colorScheme: 'light'});
 await page.goto(pathToFileURL(resolve(report)).href);
 await page.waitForFunction(() => document.documentElement.dataset.ready === '1');
-await settled(page);
+await settled(page, {whole: true});
 await page.screenshot({path: out});
 await browser.close();

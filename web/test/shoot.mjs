@@ -13,7 +13,7 @@ for (const result of results) {
   for (const width of widths.split(','))
     for (const theme of themes.split(',')) {
       const {page, faults, close} = await opened(browser, url, {width: Number(width), theme});
-      await settled(page);
+      await settled(page, {whole: true});
       await page.screenshot({path: join(out, `${name}-${width}-${theme}.png`), fullPage: true});
       const failed = await page.evaluate(() => document.querySelector('[data-failed]')?.textContent ?? '');
       console.log(name, width, theme, faults.length ? faults : 'ok', failed);

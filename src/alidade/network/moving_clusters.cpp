@@ -33,10 +33,9 @@ struct Gathered {
 };
 
 /// Derivatives of an observation by the lens [px].
-MatrixXd by_lens(const MovingProblem& problem, const MovingState& state, const SolvedObservation& observation,
+MatrixXd by_lens(const MovingState& state, const TurnedHead& turned, const SolvedObservation& observation,
                  const PathSpline::Support& at) {
   const RigHead& rig_head = state.heads[observation.head];
-  const TurnedHead turned(rig_head.head, problem.readings[observation.head]);
   const auto seen = project_with_jacobians(rig_head.camera, turned.point_in_cam(state.path.position(at)));
   if (!seen) return MatrixXd::Zero(2, params(rig_head.camera.lens).size());
   return seen->J_px_params;
@@ -47,10 +46,11 @@ Gathered gather(const MovingProblem& problem, const SolvedMoving& solved, const 
   Gathered all;
   for (const RigHead& head : solved.state.heads)
     all.lens_pull.emplace_back(MatrixXd::Zero(n, params(head.camera.lens).size()));
+  const std::vector<TurnedHead> turned = turned_heads(problem, solved.state);
   for (std::size_t i = 0; i < problem.observations.size(); ++i) {
     const SolvedObservation& observation = problem.observations[i];
     if (!solved.used[i]) continue;
-    const auto terms = observation_terms(problem, solved.state, observation);
+    const auto terms = observation_terms(problem, solved.state, turned, observation);
     if (!terms) continue;
     const double by = 1.0 / solved.sigma_px[observation.head];
     MatrixXd K = -by * terms->J_path * Z.middleRows(static_cast<Eigen::Index>(3 * terms->at.first), 12);
@@ -60,7 +60,8 @@ Gathered gather(const MovingProblem& problem, const SolvedMoving& solved, const 
         solved.state.rig_time(problem, observation.head, observation.t_s) - solved.state.path.from_s;
     const auto block = static_cast<std::size_t>(std::max(0.0, from_start_s / block_s));
     all.pulls[{block, observation.head}].add({K.transpose() * (by * terms->r), K.transpose() * K});
-    all.lens_pull[observation.head] += K.transpose() * (by * by_lens(problem, solved.state, observation, terms->at));
+    all.lens_pull[observation.head] +=
+        K.transpose() * (by * by_lens(solved.state, turned[observation.head], observation, terms->at));
   }
   return all;
 }

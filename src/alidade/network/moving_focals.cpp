@@ -27,15 +27,16 @@ BlockScores gather_scores(const MovingProblem& problem, const SolvedMoving& solv
   for (std::size_t h = 0, next = 0; h < column.size(); ++h)
     if (problem.placed[h]) column[h] = n + static_cast<Index>(next++);
   BlockScores blocks;
+  const std::vector<TurnedHead> turned = turned_heads(problem, solved.state);
   for (std::size_t i = 0; i < problem.observations.size(); ++i) {
     const SolvedObservation& observation = problem.observations[i];
-    const auto terms = solved.used[i] ? observation_terms(problem, solved.state, observation) : std::nullopt;
+    const auto terms = solved.used[i] ? observation_terms(problem, solved.state, turned, observation) : std::nullopt;
     if (!terms) continue;
     const double by = 1.0 / solved.sigma_px[observation.head];
     MatrixXd K = -by * terms->J_path * Z.middleRows(static_cast<Index>(3 * terms->at.first), 12);
     const Index first = problem.first_param(observation.head);
     if (first >= 0) K.middleCols(first, terms->J_common.cols()) += by * terms->J_common;
-    K.col(column[observation.head]) += by * J_px_focal(problem, solved.state, observation, terms->at);
+    K.col(column[observation.head]) += by * J_px_focal(solved.state, turned, observation, terms->at);
     const MatrixXd k = K.rightCols(num) - K.leftCols(n) * F;
     const double since_s = solved.state.rig_time(problem, observation.head, observation.t_s) - solved.state.path.from_s;
     BlockScore& block = blocks[static_cast<std::size_t>(std::max(0.0, since_s / solved.block_s))];
@@ -66,11 +67,11 @@ FocalScore focal_score(const BlockScores& blocks, Index j, double information) {
 
 }  // namespace
 
-Eigen::Vector2d J_px_focal(const MovingProblem& problem, const MovingState& state, const SolvedObservation& observation,
-                           const PathSpline::Support& at) {
+Eigen::Vector2d J_px_focal(const MovingState& state, std::span<const TurnedHead> turned,
+                           const SolvedObservation& observation, const PathSpline::Support& at) {
   const RigHead& rig_head = state.heads[observation.head];
-  const TurnedHead turned(rig_head.head, problem.readings[observation.head]);
-  const auto seen = project_with_jacobians(rig_head.camera, turned.point_in_cam(state.path.position(at)));
+  const auto seen =
+      project_with_jacobians(rig_head.camera, turned[observation.head].point_in_cam(state.path.position(at)));
   if (!seen) return Eigen::Vector2d::Zero();
   return seen->J_px_params.leftCols(2) * params(rig_head.camera.lens).head(2);
 }

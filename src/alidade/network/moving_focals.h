@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "alidade/network/moving_solve.h"
@@ -10,7 +11,7 @@
 namespace alidade {
 
 /// Derivative of an observation by a relative change of its lens's focal lengths, both alike [px].
-[[nodiscard]] Eigen::Vector2d J_px_focal(const MovingProblem& problem, const MovingState& state,
+[[nodiscard]] Eigen::Vector2d J_px_focal(const MovingState& state, std::span<const TurnedHead> turned,
                                          const SolvedObservation& observation, const PathSpline::Support& at);
 
 /// What the residuals would gain if the focal length of one camera were free: score tests, one linearisation, poses,

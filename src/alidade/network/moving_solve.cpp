@@ -62,15 +62,16 @@ struct Solver {
 
   [[nodiscard]] double cost(const MovingState& at) const {
     double sum = common_cost(at);
+    const std::vector<TurnedHead> turned = turned_heads(problem, at);
     for (std::size_t i = 0; i < problem.observations.size(); ++i) {
       if (!used[i]) continue;
       const SolvedObservation& observation = problem.observations[i];
       const auto support = at.path.support(at.rig_time(problem, observation.head, observation.t_s));
-      const auto seen =
-          support ? project(at.heads[observation.head], problem.readings[observation.head], at.path.position(*support))
-                  : std::nullopt;
+      const auto seen = support ? project(at.heads[observation.head].camera,
+                                          turned[observation.head].point_in_cam(at.path.position(*support)))
+                                : std::nullopt;
       if (seen)
-        sum += loss((seen->px - observation.px).squaredNorm() / std::pow(sigma_px[observation.head], 2));
+        sum += loss((*seen - observation.px).squaredNorm() / std::pow(sigma_px[observation.head], 2));
       else
         sum += is_soft ? soft_sigmas * soft_sigmas : std::numeric_limits<double>::infinity();
     }
@@ -109,9 +110,10 @@ struct Solver {
     PathSystem system(state.path.control.size(), problem.num_common());
     add_fixed(system);
     residual.assign(problem.observations.size(), Eigen::Vector2d::Constant(not_seen));
+    const std::vector<TurnedHead> turned = turned_heads(problem, state);
     for (std::size_t i = 0; i < problem.observations.size(); ++i) {
       const SolvedObservation& observation = problem.observations[i];
-      const auto terms = observation_terms(problem, state, observation);
+      const auto terms = observation_terms(problem, state, turned, observation);
       if (!terms) continue;
       residual[i] = terms->r;
       if (!used[i]) continue;
@@ -131,15 +133,16 @@ struct Solver {
       if (problem.placed[h]) column[h] = num++;
     PathSystem system(state.path.control.size(), num);
     add_fixed(system);
+    const std::vector<TurnedHead> turned = turned_heads(problem, state);
     for (std::size_t i = 0; i < problem.observations.size(); ++i) {
       const SolvedObservation& observation = problem.observations[i];
-      const auto terms = used[i] ? observation_terms(problem, state, observation) : std::nullopt;
+      const auto terms = used[i] ? observation_terms(problem, state, turned, observation) : std::nullopt;
       if (!terms) continue;
       const double by = 1.0 / sigma_px[observation.head];
       Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2, num);
       const Eigen::Index first = problem.first_param(observation.head);
       if (first >= 0) J.middleCols(first, terms->J_common.cols()) = by * terms->J_common;
-      J.col(column[observation.head]) = by * J_px_focal(problem, state, observation, terms->at);
+      J.col(column[observation.head]) = by * J_px_focal(state, turned, observation, terms->at);
       system.add(terms->at.first, by * terms->J_path, by * terms->r, 0, J);
     }
     return system;
@@ -302,21 +305,32 @@ Eigen::Index MovingProblem::first_param(std::size_t head) const {
   return before * params_a_head();
 }
 
+std::vector<TurnedHead> turned_heads(const MovingProblem& problem, const MovingState& state) {
+  std::vector<TurnedHead> turned;
+  turned.reserve(state.heads.size());
+  for (std::size_t h = 0; h < state.heads.size(); ++h) turned.emplace_back(state.heads[h].head, problem.readings[h]);
+  return turned;
+}
+
 std::optional<ObservationTerms> observation_terms(const MovingProblem& problem, const MovingState& state,
+                                                  std::span<const TurnedHead> turned,
                                                   const SolvedObservation& observation) {
   const auto at = state.path.support(state.rig_time(problem, observation.head, observation.t_s));
   if (!at) return std::nullopt;
-  const auto seen =
-      project_with_head(state.heads[observation.head], problem.readings[observation.head], state.path.position(*at));
+  const RigHead& rig_head = state.heads[observation.head];
+  const TurnedHead& head = turned[observation.head];
+  const Eigen::Vector3d point = state.path.position(*at);
+  const auto seen = project_with_jacobians(rig_head.camera, head.point_in_cam(point));
   if (!seen) return std::nullopt;
-  ObservationTerms terms{*at, seen->pixel.px - observation.px, {}, Eigen::MatrixXd(2, 0)};
+  const Eigen::Matrix<double, 2, 3> J_px_point = seen->J_px_point * head.cam_from_world_rotation;
+  ObservationTerms terms{*at, seen->px - observation.px, {}, {}};
   for (std::size_t k = 0; k < 4; ++k)
-    terms.J_path.middleCols<3>(static_cast<Eigen::Index>(3 * k)) = at->weight[k] * seen->pixel.J_px_point;
+    terms.J_path.middleCols<3>(static_cast<Eigen::Index>(3 * k)) = at->weight[k] * J_px_point;
   if (problem.first_param(observation.head) < 0) return terms;
   terms.J_common.resize(2, problem.params_a_head());
-  terms.J_common.leftCols<6>() = seen->J_px_head.leftCols<6>();
+  terms.J_common.leftCols<6>() = seen->J_px_point * head.J_point_base(rig_head.head.world_from_base.inverse() * point);
   if (!problem.clocks_are_free) return terms;
-  const Eigen::Vector2d by_time = seen->pixel.J_px_point * state.path.velocity(*at);
+  const Eigen::Vector2d by_time = J_px_point * state.path.velocity(*at);
   terms.J_common.col(6) = -by_time;
   terms.J_common.col(7) = -by_time * (observation.t_s - problem.mid_s[observation.head]);
   return terms;

@@ -69,10 +69,14 @@ struct ObservationTerms {
   PathSpline::Support at;
   Eigen::Vector2d r;  ///< Prediction − observation [px].
   Eigen::Matrix<double, 2, 12> J_path;
-  Eigen::MatrixXd J_common;  ///< By its head's own parameters; no columns where they are fixed.
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 8> J_common;  ///< By its head's own; no columns where they are fixed.
 };
-/// None where the path has no such moment, or the camera does not see it.
+/// The state's heads at their readings.
+[[nodiscard]] std::vector<TurnedHead> turned_heads(const MovingProblem& problem, const MovingState& state);
+
+/// `turned`: the state's. None where the path has no such moment, or the camera does not see it.
 [[nodiscard]] std::optional<ObservationTerms> observation_terms(const MovingProblem& problem, const MovingState& state,
+                                                                std::span<const TurnedHead> turned,
                                                                 const SolvedObservation& observation);
 
 /// Maximum likelihood over poses, clocks and path, with soft weights (Geman–McClure) first and without what then is

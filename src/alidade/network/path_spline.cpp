@@ -51,9 +51,10 @@ void PathSystem::add(std::size_t first_control, const Eigen::Matrix<double, 2, 1
   path_.segment<12>(at) -= J_path.transpose() * r;
   const Eigen::Index num = J_common.cols();
   if (num == 0) return;
-  W_.block(at, first_common, 12, num) += J_path.transpose() * J_common;
-  U_.block(first_common, first_common, num, num) += J_common.transpose() * J_common;
-  common_.segment(first_common, num) -= J_common.transpose() * r;
+  // Two rows: coefficient by coefficient, since a blocked product packs more than it multiplies.
+  W_.block(at, first_common, 12, num) += J_path.transpose().lazyProduct(J_common);
+  U_.block(first_common, first_common, num, num) += J_common.transpose().lazyProduct(J_common);
+  common_.segment(first_common, num) -= J_common.transpose().lazyProduct(r);
 }
 
 void PathSystem::add_bend(std::span<const Eigen::Vector3d> control, std::size_t k, double weight) {

@@ -122,14 +122,18 @@ Eigen::Matrix<double, 3, 2> TurnedHead::J_point_readings(const Eigen::Vector3d& 
   return J;
 }
 
+Eigen::Matrix<double, 3, 6> TurnedHead::J_point_base(const Eigen::Vector3d& point_in_base) const {
+  Eigen::Matrix<double, 3, 6> J;
+  J << -cam_from_base_rotation, cam_from_base_rotation * cross_matrix(point_in_base);
+  return J;
+}
+
 Eigen::Matrix<double, 3, num_head_params> TurnedHead::J_point_head(const Eigen::Vector3d& point_in_cam) const {
   const Eigen::Vector3d point_in_tilt = cam_from_tilt_rotation.transpose() * point_in_cam;
   const Eigen::Vector3d from_tilt_axis = point_in_tilt + tilt_to_cam_m;
   const Eigen::Vector3d from_pan_axis = tilt_from_pan_rotation.transpose() * from_tilt_axis + pan_to_tilt_m;
-  const Eigen::Vector3d point_in_base = pan_from_base_rotation.transpose() * from_pan_axis;
   Eigen::Matrix<double, 3, num_head_params> J;
-  J.leftCols<3>() = -cam_from_base_rotation;
-  J.middleCols<3>(3) = cam_from_base_rotation * cross_matrix(point_in_base);
+  J.leftCols<6>() = J_point_base(pan_from_base_rotation.transpose() * from_pan_axis);
   J.middleCols<3>(6) = -cam_from_tilt_rotation * tilt_from_pan_rotation;
   J.middleCols<3>(9) = -cam_from_tilt_rotation;
   J.middleCols<3>(12) = -cam_from_tilt_rotation * cross_matrix(point_in_tilt);
@@ -171,17 +175,6 @@ std::optional<HeadPixel> project(const TurnedHead& turned, const Camera& camera,
 std::optional<HeadPixel> project(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
                                  const Eigen::Vector3d& point_in_world) {
   return project(TurnedHead(rig_head.head, pan_tilt_rad), rig_head.camera, point_in_world);
-}
-
-std::optional<HeadPixelOfParams> project_with_head(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
-                                                   const Eigen::Vector3d& point_in_world) {
-  const TurnedHead turned(rig_head.head, pan_tilt_rad);
-  const Eigen::Vector3d point_in_cam = turned.point_in_cam(point_in_world);
-  const auto seen = project_with_jacobians(rig_head.camera, point_in_cam);
-  if (!seen) return std::nullopt;
-  return HeadPixelOfParams{{seen->px, point_in_cam, seen->J_px_point * turned.cam_from_world_rotation,
-                            seen->J_px_point * turned.J_point_readings(point_in_cam)},
-                           seen->J_px_point * turned.J_point_head(point_in_cam)};
 }
 
 std::optional<WorldRay> ray_in_world(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,

@@ -99,6 +99,8 @@ struct TurnedHead {
   }
   /// ∂ point_in_cam / ∂ point_in_world is cam_from_world_rotation; by the readings (pan, tilt):
   [[nodiscard]] Eigen::Matrix<double, 3, 2> J_point_readings(const Eigen::Vector3d& point_in_cam) const;
+  /// ∂ point_in_cam / ∂ the pose of its base: the first six of the head's parameters.
+  [[nodiscard]] Eigen::Matrix<double, 3, 6> J_point_base(const Eigen::Vector3d& point_in_base) const;
   /// ∂ point_in_cam / ∂ the head's parameters.
   [[nodiscard]] Eigen::Matrix<double, 3, num_head_params> J_point_head(const Eigen::Vector3d& point_in_cam) const;
 };
@@ -115,15 +117,6 @@ struct HeadPixel {
                                                const Eigen::Vector3d& point_in_world);
 [[nodiscard]] std::optional<HeadPixel> project(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
                                                const Eigen::Vector3d& point_in_world);
-
-/// The same with the derivatives by the head's parameters.
-struct HeadPixelOfParams {
-  HeadPixel pixel;
-  Eigen::Matrix<double, 2, num_head_params> J_px_head;
-};
-[[nodiscard]] std::optional<HeadPixelOfParams> project_with_head(const RigHead& rig_head,
-                                                                 const Eigen::Vector2d& pan_tilt_rad,
-                                                                 const Eigen::Vector3d& point_in_world);
 
 /// The ray of an observation.
 struct WorldRay {

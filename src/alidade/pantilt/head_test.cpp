@@ -60,24 +60,27 @@ TEST(Head, JacobiansAreTheDerivatives) {
     const RigHead at = random_head(rng);
     const Eigen::Vector2d readings = random_vector(rng, 0.6).head<2>();
     const Eigen::Vector3d point = point_in_observation(at, readings, rng);
-    const auto seen = project_with_head(at, readings, point);
+    const TurnedHead turned(at.head, readings);
+    const auto seen = project(turned, at.camera, point);
     ASSERT_TRUE(seen);
+    const Eigen::Matrix<double, 2, num_head_params> J_px_head =
+        seen->J_px_point * turned.cam_from_world_rotation.transpose() * turned.J_point_head(seen->point_in_cam);
     const auto expect_column = [&](const Eigen::Vector2d& plus, const Eigen::Vector2d& minus, const auto& column) {
       EXPECT_LE(((plus - minus) / (2.0 * step) - column).norm(), derivative_tolerance * std::max(1.0, column.norm()));
       ++num_checked;
     };
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3d d = step * Eigen::Vector3d::Unit(k);
-      expect_column(pixel(at, readings, point + d), pixel(at, readings, point - d), seen->pixel.J_px_point.col(k));
+      expect_column(pixel(at, readings, point + d), pixel(at, readings, point - d), seen->J_px_point.col(k));
     }
     for (int k = 0; k < 2; ++k) {
       const Eigen::Vector2d d = step * Eigen::Vector2d::Unit(k);
-      expect_column(pixel(at, readings + d, point), pixel(at, readings - d, point), seen->pixel.J_px_readings.col(k));
+      expect_column(pixel(at, readings + d, point), pixel(at, readings - d, point), seen->J_px_readings.col(k));
     }
     for (int k = 0; k < num_head_params; ++k) {
       const HeadVector d = step * HeadVector::Unit(k);
       expect_column(pixel({retract(at.head, d), at.camera}, readings, point),
-                    pixel({retract(at.head, -d), at.camera}, readings, point), seen->J_px_head.col(k));
+                    pixel({retract(at.head, -d), at.camera}, readings, point), J_px_head.col(k));
     }
   }
   EXPECT_EQ(num_checked, 50 * 29);

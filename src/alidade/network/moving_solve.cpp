@@ -1,12 +1,11 @@
 #include "alidade/network/moving_solve.h"
-#include "alidade/estimation/median.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/network/moving_clusters.h"
 #include "alidade/network/moving_focals.h"
@@ -307,7 +306,6 @@ Eigen::Index MovingProblem::first_param(std::size_t head) const {
 
 std::vector<TurnedHead> turned_heads(const MovingProblem& problem, const MovingState& state) {
   std::vector<TurnedHead> turned;
-  turned.reserve(state.heads.size());
   for (std::size_t h = 0; h < state.heads.size(); ++h) turned.emplace_back(state.heads[h].head, problem.readings[h]);
   return turned;
 }

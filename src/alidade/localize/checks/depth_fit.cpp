@@ -20,8 +20,7 @@ struct Downwards {
   }
 };
 
-double depth_of(const DepthRow& row, const DepthModel& model, const DepthFit& fit) {
-  const Downwards by(fit.g());
+double depth_of(const DepthRow& row, const DepthModel& model, const DepthFit& fit, const Downwards& by) {
   double depth = fit.g().dot(row.place) + fit.values[3] + fit.values[4] * row.after_jump;
   depth += fit.values.segment(5, model.num_drift).dot(row.drift.head(model.num_drift));
   return model.has_arm() ? depth + by.down.dot(row.rotation * fit.arm_m) : depth;
@@ -47,8 +46,9 @@ std::optional<DepthFit> stepped(const DepthModel& model, const DepthFit& from, s
     }
     if (model.sigma_arm_m) J.tail<3>() = row.rotation.transpose() * by.down;
     const double weight = row.weight * row.weight;
-    H.noalias() += weight * J * J.transpose();
     b += weight * depth * J;
+    for (int j = 0; j < dim; ++j)
+      for (int i = j; i < dim; ++i) H(i, j) += weight * J[j] * J[i];  // below the diagonal: LDLᵀ needs no more
   }
   // A path in a plane, or on a line, determines nothing of the direction across it: as good as none of it is downwards.
   constexpr double hardly = 1e-9;
@@ -65,47 +65,27 @@ std::optional<DepthFit> stepped(const DepthModel& model, const DepthFit& from, s
   DepthFit fit{ldlt.solve(b), from.arm_m, ldlt.inverse()};
   if (!fit.values.allFinite() || !fit.cov.allFinite()) return std::nullopt;
   if (model.sigma_arm_m) fit.arm_m = fit.values.tail<3>();
-  for (DepthRow& row : rows) row.left = row.weight * (row.depth_m - depth_of(row, model, fit));
+  const Downwards fitted(fit.g());
+  for (DepthRow& row : rows) row.left = row.weight * (row.depth_m - depth_of(row, model, fit, fitted));
   return fit;
-}
-
-std::vector<PathStep> positions_of(std::span<const PathStep> path, int axis) {
-  std::vector<PathStep> steps(path.begin(), path.end());
-  for (PathStep& step : steps)
-    step.world_from_cam.translation = step.world_from_cam.rotation.toRotationMatrix().col(axis);
-  return steps;
 }
 
 }  // namespace
 
-SensorPath::SensorPath(std::span<const PathStep> path, bool has_axes) : place(path.begin(), path.end()) {
-  if (!has_axes) return;
-  for (int i = 0; i < 3; ++i) axes[static_cast<std::size_t>(i)] = positions_of(path, i);
-}
-
-SensorPath SensorPath::filtered(double tau_s) const {
-  SensorPath shown;
-  shown.place = alidade::filtered(place, tau_s);
-  for (std::size_t i = 0; i < axes.size(); ++i)
-    if (!axes[i].empty()) shown.axes[i] = alidade::filtered(axes[i], tau_s);
-  return shown;
-}
-
 std::vector<DepthRow> rows_at(const DepthModel& model, double late_s, const SensorPath& path) {
   std::vector<DepthRow> rows;
-  if (path.place.empty()) return rows;
-  const double from_s = path.place.front().t_s, length_s = path.place.back().t_s - from_s;
+  if (path.steps.empty()) return rows;
+  const double from_s = path.steps.front().t_s, length_s = path.steps.back().t_s - from_s;
+  rows.reserve(model.readings.size());
   for (const DepthReading& reading : model.readings) {
     const double t_s = reading.t_s - late_s;
-    const auto pose = pose_at(path.place, t_s);
-    if (!pose) continue;
-    DepthRow row{.depth_m = reading.depth_m, .weight = 1.0 / reading.sigma_m, .place = pose->translation};
+    const auto there = path.at(t_s);
+    if (!there) continue;
+    DepthRow row{.depth_m = reading.depth_m, .weight = 1.0 / reading.sigma_m, .place = there->col(0)};
     row.after_jump = reading.t_s > model.jump_s ? 1.0 : 0.0;
     for (int i = 0; i < model.num_drift; ++i)
       row.drift[i] = std::clamp((t_s - from_s) / length_s * model.num_drift - i, 0.0, 1.0);
-    if (model.has_arm())
-      for (int i = 0; i < 3; ++i)
-        row.rotation.col(i) = pose_at(path.axes[static_cast<std::size_t>(i)], t_s)->translation;
+    if (model.has_arm()) row.rotation = there->rightCols<3>();
     rows.push_back(row);
   }
   return rows;
@@ -175,8 +155,9 @@ DepthCost cost_of(const DepthModel& model, const std::vector<DepthRow>& rows, st
   if (!fit) return {};
   DepthCost cost{0.0, 1.0, inflation(near), 0.0, limit.value_or(fit->limit)};
   const auto num = static_cast<double>(rows.size());
+  const Downwards by(fit->g());
   for (const DepthRow& row : rows) {
-    const double left = row.weight * (row.depth_m - depth_of(row, model, *fit));
+    const double left = row.weight * (row.depth_m - depth_of(row, model, *fit, by));
     cost.cost += std::min(left * left, cost.limit * cost.limit) / num;
     cost.rejected += std::abs(left) > cost.limit ? 1.0 / num : 0.0;
   }

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <limits>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/config.h"
 #include "alidade/localize/localization.h"
 
@@ -28,19 +28,6 @@ struct DepthModel {
   static constexpr int most_drift = 4;
   [[nodiscard]] bool has_arm() const { return sigma_arm_m || !arm_m.isZero(0.0); }
   [[nodiscard]] int dim() const { return 5 + num_drift + (sigma_arm_m ? 3 : 0); }
-};
-
-/// What a sensor is shown: positions, and where an arm counts the axes of the camera as positions.
-struct SensorPath {
-  std::vector<PathStep> place;
-  std::array<std::vector<PathStep>, 3> axes;
-
-  SensorPath(std::span<const PathStep> path, bool has_axes);
-  /// By a filter of first order.
-  [[nodiscard]] SensorPath filtered(double tau_s) const;
-
- private:
-  SensorPath() = default;
 };
 
 /// A reading, and where the camera was.

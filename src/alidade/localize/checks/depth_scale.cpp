@@ -14,11 +14,6 @@ namespace {
 
 constexpr double never_s = std::numeric_limits<double>::infinity();
 
-DepthModel with_jump(DepthModel model, double jump_s) {
-  model.jump_s = jump_s;
-  return model;
-}
-
 /// Mean square of what is left, in σ².
 double misfit_of(const DepthModel& model, std::vector<DepthRow> rows) {
   if (!fitted_without_far(model, rows)) return std::numeric_limits<double>::infinity();
@@ -96,13 +91,16 @@ double jump_of(const DepthModel& model, const SensorPath& path) {
   const DepthCost without = cost_of(model, rows);
   std::vector<double> t_s;
   for (const DepthReading& reading : model.readings)
-    if (pose_at(path.place, reading.t_s)) t_s.push_back(reading.t_s);
+    if (path.at(reading.t_s)) t_s.push_back(reading.t_s);
   if (t_s.size() < 4 * ends || (without.alike < alike && without.rejected < few)) return never_s;
   std::size_t best = 0;
   DepthCost least;
+  std::vector<DepthRow> jumping = rows;
   const auto look = [&](std::size_t from, std::size_t to, std::size_t stride) {
     for (std::size_t k = std::max(from, ends); k <= std::min(to, t_s.size() - ends); k += stride) {
-      const DepthCost at = cost_of(model, rows_at(with_jump(model, 0.5 * (t_s[k - 1] + t_s[k])), 0.0, path));
+      const double jump_s = 0.5 * (t_s[k - 1] + t_s[k]);
+      for (std::size_t i = 0; i < t_s.size(); ++i) jumping[i].after_jump = t_s[i] > jump_s ? 1.0 : 0.0;
+      const DepthCost at = cost_of(model, jumping);
       if (at.cost < least.cost) least = at, best = k;
     }
   };
@@ -251,7 +249,7 @@ void take_found(const Account& account, const DepthFit& fit, double worse, ReadS
 
 std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
                                         std::span<const PathStep> given_path, const DepthArm& arm) {
-  const SensorPath path(without_jitter(given_path, jitter_s), true);
+  const SensorPath path(without_jitter(given_path, jitter_s));
   DepthModel model{.readings = readings, .arm_m = arm.in_cam_m, .sigma_arm_m = arm.sigma_m};
   Account account = searched(model, path);
   for (auto next = better(account, path); next; next = better(account, path)) account = *std::move(next);

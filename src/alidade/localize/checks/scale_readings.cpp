@@ -11,14 +11,47 @@
 
 namespace alidade {
 
-std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s) {
-  const auto after = std::ranges::lower_bound(path, t_s, {}, &PathStep::t_s);
+namespace {
+
+/// The two frames around a time that have a pose, and the share of the second.
+template <typename Step>
+struct Around {
+  const Step *before = nullptr, *after = nullptr;
+  double share = 0.0;
+};
+
+template <typename Step>
+std::optional<Around<Step>> around(std::span<const Step> path, double t_s) {
+  const auto after = std::ranges::lower_bound(path, t_s, {}, &Step::t_s);
   if (after == path.end()) return std::nullopt;
   const auto before = after->t_s == t_s || after == path.begin() ? after : after - 1;
   if (before->t_s > t_s || !before->has_pose() || !after->has_pose()) return std::nullopt;
-  const double gap_s = after->t_s - before->t_s, share = gap_s > 0.0 ? (t_s - before->t_s) / gap_s : 0.0;
+  const double gap_s = after->t_s - before->t_s;
+  return Around<Step>{&*before, &*after, gap_s > 0.0 ? (t_s - before->t_s) / gap_s : 0.0};
+}
+
+}  // namespace
+
+std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s) {
+  const auto there = around(path, t_s);
+  if (!there) return std::nullopt;
+  const auto [before, after, share] = *there;
   const Rigid3 &a = before->world_from_cam, &b = after->world_from_cam;
   return Rigid3{a.rotation.slerp(share, b.rotation), (1.0 - share) * a.translation + share * b.translation};
+}
+
+SensorPath::SensorPath(std::span<const PathStep> path) {
+  steps.reserve(path.size());
+  for (const PathStep& step : path) {
+    steps.push_back({step.t_s, step.has_pose()});
+    steps.back().numbers << step.world_from_cam.translation, step.world_from_cam.rotation.toRotationMatrix();
+  }
+}
+
+std::optional<SensorPath::Numbers> SensorPath::at(double t_s) const {
+  const auto there = around(std::span<const Step>(steps), t_s);
+  if (!there) return std::nullopt;
+  return (1.0 - there->share) * there->before->numbers + there->share * there->after->numbers;
 }
 
 Eigen::Matrix3d position_cov_at(std::span<const PathStep> path, double t_s) {
@@ -39,31 +72,35 @@ double persistent_square(std::span<const Eigen::Vector3d> left) {
   return std::max(0.0, squares / num - steps / (num - 1.0));
 }
 
-std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s) {
+SensorPath SensorPath::filtered(double tau_s) const {
   constexpr double forgotten = 3.0;  // time constants
-  std::vector<PathStep> steps(path.begin(), path.end());
-  const PathStep* last = nullptr;
+  SensorPath path = *this;
   double since_s = 0.0;
-  for (PathStep& step : steps) {
-    if (!step.has_pose()) {
-      last = nullptr;
-      continue;
-    }
-    if (last == nullptr) {
-      since_s = step.t_s;
-    } else {
+  bool has_last = false;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (has_last && steps[i].is_shown) {
       // Between two frames the path is straight.
-      const PathStep& now = path[static_cast<std::size_t>(&step - steps.data())];
-      const PathStep& before = path[static_cast<std::size_t>(last - steps.data())];
-      const double gap_s = step.t_s - last->t_s, kept = std::exp(-gap_s / tau_s);
-      const Eigen::Vector3d speed = (now.world_from_cam.translation - before.world_from_cam.translation) / gap_s;
-      const Eigen::Vector3d behind = last->world_from_cam.translation - before.world_from_cam.translation;
-      step.world_from_cam.translation = now.world_from_cam.translation + kept * behind - (1.0 - kept) * tau_s * speed;
+      const Step &now = steps[i], &before = steps[i - 1];
+      const double gap_s = now.t_s - before.t_s, kept = std::exp(-gap_s / tau_s);
+      const double of_speed = (1.0 - kept) * tau_s / gap_s;
+      path.steps[i].numbers += kept * (path.steps[i - 1].numbers - before.numbers);
+      path.steps[i].numbers -= of_speed * (now.numbers - before.numbers);
+    } else if (steps[i].is_shown) {
+      since_s = steps[i].t_s;
     }
-    last = &step;
+    has_last = steps[i].is_shown;
   }
-  for (PathStep& step : steps)
-    if (step.t_s < since_s + forgotten * tau_s) step.event = FrameEvent::waiting;
+  for (Step& step : path.steps) step.is_shown = step.is_shown && step.t_s >= since_s + forgotten * tau_s;
+  return path;
+}
+
+std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s) {
+  const SensorPath shown = SensorPath(path).filtered(tau_s);
+  std::vector<PathStep> steps(path.begin(), path.end());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    steps[i].world_from_cam.translation = shown.steps[i].numbers.col(0);
+    if (!shown.steps[i].is_shown) steps[i].event = FrameEvent::waiting;
+  }
   return steps;
 }
 

@@ -48,8 +48,26 @@ struct ReadScale {
 /// squared step between two, in the unit of `left`, squared. No number of readings averages that.
 [[nodiscard]] double persistent_square(std::span<const Eigen::Vector3d> left);
 
-/// What a sensor whose filter of first order has a time constant is shown of a path; nothing before it has forgotten
-/// its first value.
+/// Of a path what sensors are shown: where the camera is and how it is rotated, numbers that a filter averages each by
+/// itself.
+struct SensorPath {
+  using Numbers = Eigen::Matrix<double, 3, 4>;  ///< Position, and the camera's axes.
+  struct Step {
+    double t_s = 0.0;
+    bool is_shown = false;
+    Numbers numbers = Numbers::Zero();
+    [[nodiscard]] bool has_pose() const { return is_shown; }
+  };
+  std::vector<Step> steps;
+
+  explicit SensorPath(std::span<const PathStep> path);
+  /// By a filter of first order that has a time constant; nothing before it has forgotten its first value.
+  [[nodiscard]] SensorPath filtered(double tau_s) const;
+  /// Between the two frames around a time. None outside the path, or where one of them has none.
+  [[nodiscard]] std::optional<Numbers> at(double t_s) const;
+};
+
+/// What a sensor with such a filter is shown of a path: positions.
 [[nodiscard]] std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s);
 
 /// A path without what differs from frame to frame: positions by parabolas through those within `half_s`. A filter

@@ -172,6 +172,7 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   RotationBundleConfig solve;
   solve.nuisances = config.nuisances;
   solve.with_depth = config.with_depth;
+  solve.gives_up = config.gives_up;
   solve.sigma_rotation_rad = config.sigma_rotation_rad;
   solve.sigma_rate_rad_per_s = config.sigma_rate_rad_per_s;
   solve.sigma_range_m = config.sigma_range_m > 0.0 ? config.sigma_range_m : 1e-3;

@@ -56,6 +56,7 @@ struct AdjustConfig {
   /// fx = fy to try one after the other beside the start's, normalised.
   std::vector<double> other_starts;
   int max_iterations = 60;  ///< From each start: one that is near the answer is there after a dozen.
+  bool gives_up = false;    ///< What does not seem to settle is no answer; for what is compared by its noise alone.
 };
 
 struct Adjustment {

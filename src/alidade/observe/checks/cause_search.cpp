@@ -127,6 +127,7 @@ FrameBuffer buffer_of(const std::vector<RotationFrame>& frames, const Sample& sa
 AdjustConfig trial_config(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
                           int num_errors) {
   AdjustConfig adjust_with;
+  adjust_with.gives_up = true;
   adjust_with.nuisances = config.nuisances;
   adjust_with.nuisances.errors = num_errors;
   adjust_with.with_depth = needs_depth(log, config);
@@ -267,6 +268,7 @@ bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const Obser
   sized.width_px = report.width_px;
   sized.height_px = report.height_px;
   AdjustConfig still;
+  still.gives_up = true;
   still.start = start_camera(sized, report.scale);
   still.other_starts = {2.5, 5.0};
   int judged = 0, varying = 0;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/observe/solve/bundle_normal.h"
 #include "alidade/observe/solve/gram_sum.h"
@@ -37,6 +39,7 @@ class Solver {
     double cost = cost_at(state_);
     double damping = 1e-4;
     int num_settled = 0;
+    std::vector<double> gains;
     for (int i = 0; i < config_.max_iterations && std::isfinite(cost); ++i) {
       report_progress(progress, "adjust", static_cast<std::size_t>(i),
                       static_cast<std::size_t>(config_.max_iterations));
@@ -63,6 +66,8 @@ class Solver {
         break;
       }
       cost = next_cost;
+      gains.push_back(gain);
+      if (is_hopeless(gains, cost)) break;
     }
     linearise();
     conclude(solution);
@@ -70,6 +75,22 @@ class Solver {
   }
 
  private:
+  /// Whether steps that gain in proportion to the last ones would not settle in those that are left, far from where
+  /// most residuals are noise.
+  [[nodiscard]] bool is_hopeless(const std::vector<double>& gains, double cost) const {
+    constexpr std::size_t enough = 20, over = 5;
+    constexpr double settled = 1e-3, by_far = 1.5, far_off = 5.0;
+    if (!config_.gives_up || gains.size() < enough) return false;
+    const auto last = std::span(gains).last(over + 1);
+    const double log_rate = std::log(last.back() / last.front()) / static_cast<double>(over);
+    const double target = std::max(settled, 1e-9 * (1.0 + cost));
+    const double needed =
+        log_rate < 0.0 ? std::log(target / last.back()) / log_rate : std::numeric_limits<double>::infinity();
+    const auto left = static_cast<double>(config_.max_iterations) - static_cast<double>(gains.size());
+    return needed > by_far * std::max(left, 1.0) &&
+           median_of(residual_px_) > far_off * rayleigh_median * config_.sigma_px;
+  }
+
   static ObserveNuisances without_rotation(ObserveNuisances nuisances) {
     nuisances.rotation = false;
     return nuisances;

@@ -44,6 +44,7 @@ struct RotationBundleConfig {
       0.0;             ///< Above zero: rotations are integrated rates with this white noise per sample: a random walk.
   double huber = 2.5;  ///< Residuals beyond so many σ count less. 0: all count alike.
   int max_iterations = 60;
+  bool gives_up = false;  ///< It ends unsettled as soon as it seems that it will, where residuals are many σ.
 };
 
 /// Prior of the shared parameters: normal distributions, weak where nothing is given.

@@ -66,6 +66,7 @@ std::vector<BeamScale> scales_at(const RangeData& data, const RangeReading& read
                       data.beam, reading.range_m);
     };
     const auto one = before ? seen_from(*before) : std::nullopt, other = after ? seen_from(*after) : std::nullopt;
+    scale->met_in_world = *pose * (std::exp(-scale->log_scale) * point_at(data.beam, reading.range_m));
     if (one && other) scale->of_time = (std::exp(other->log_scale) - std::exp(one->log_scale)) / (2.0 * step_s);
     scales.push_back(*scale);
   }

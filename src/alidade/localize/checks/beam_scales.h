@@ -23,6 +23,7 @@ struct BeamScale {
   double of_offset = 0.0;                                  ///< ∂scale / ∂(length of all readings). [units/m]
   Eigen::Vector2d of_direction = Eigen::Vector2d::Zero();  ///< ∂scale / ∂(direction of the beam). [units/rad]
   double of_time = 0.0;                                    ///< ∂scale / ∂(time of the pose). [units/s]
+  Eigen::Vector3d met_in_world = Eigen::Vector3d::Zero();  ///< Where the beam meets the surface. [units]
 };
 
 /// One scale of each reading, and ln of another over it that at least half as many of them have.

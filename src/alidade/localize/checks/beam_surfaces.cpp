@@ -61,26 +61,64 @@ bool surround(const Eigen::Vector3d& direction, const Points& points) {
   return widest < std::numbers::pi;
 }
 
-/// Those of the points that are in the plane through three of them with the most, and out of `points`.
-Points taken_plane(Points& points) {
-  constexpr double tolerance = 0.01;  // of the distance
-  Points best;
-  const auto near_plane = [&](const Eigen::Vector3d& normal, const Eigen::Vector3d& in_plane) {
-    Points near;
-    for (const Eigen::Vector3d& point : points)
-      if (std::abs(normal.dot(point - in_plane)) < tolerance * in_plane.norm()) near.push_back(point);
-    return near;
+/// Those of the points that are in the plane through three of them with the most. `tolerance`: over the distance.
+Points most_in_plane(const Points& points, double tolerance) {
+  struct Plane {
+    Eigen::Vector3d normal, in_plane;
+    [[nodiscard]] bool has(const Eigen::Vector3d& point, double tolerance) const {
+      return std::abs(normal.dot(point - in_plane)) < tolerance * in_plane.norm();
+    }
   };
+  Plane best{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  std::ptrdiff_t most = 0;
   for (std::size_t i = 0; i < points.size(); ++i)
     for (std::size_t j = i + 1; j < points.size(); ++j)
       for (std::size_t k = j + 1; k < points.size(); ++k) {
         const Eigen::Vector3d normal = (points[j] - points[i]).cross(points[k] - points[i]);
         if (!(normal.norm() > 0.0)) continue;
-        Points near = near_plane(normal.normalized(), points[i]);
-        if (near.size() > best.size()) best = std::move(near);
+        const Plane plane{normal.normalized(), points[i]};
+        const auto num = std::ranges::count_if(points, [&](const auto& point) { return plane.has(point, tolerance); });
+        if (num > most) best = plane, most = num;
       }
-  std::erase_if(points, [&](const Eigen::Vector3d& point) { return std::ranges::find(best, point) != best.end(); });
-  return best;
+  Points near;
+  for (const Eigen::Vector3d& point : points)
+    if (best.has(point, tolerance)) near.push_back(point);
+  return near;
+}
+
+/// Of a rough surface those in one plane, and those in as smooth a one as has three quarters as many: at an edge the
+/// others lie behind it. Where these are not all around the beam, the former.
+struct PlanePoints {
+  Points rough, smooth;
+};
+PlanePoints plane_points(const Eigen::Vector3d& direction, const Points& points) {
+  constexpr double tolerance = 0.01;
+  constexpr std::ptrdiff_t of_four = 3;
+  PlanePoints of_plane{most_in_plane(points, tolerance), {}};
+  for (const double smoother : {0.001, 0.002}) {
+    of_plane.smooth = most_in_plane(points, smoother);
+    const auto num = static_cast<std::ptrdiff_t>(of_plane.smooth.size());
+    const auto shared = std::ranges::count_if(of_plane.smooth, [&](const Eigen::Vector3d& point) {
+      return std::ranges::find(of_plane.rough, point) != of_plane.rough.end();
+    });
+    const bool is_same = 4 * shared >= of_four * num;  // not what stands before it
+    const bool has_most = is_same && 4 * num >= of_four * std::ssize(of_plane.rough);
+    if (has_most && surround(direction, of_plane.smooth)) return of_plane;
+  }
+  of_plane.smooth = of_plane.rough;
+  return of_plane;
+}
+
+/// Through the nearest of the smooth ones, as rough as the nearest of all: what is smooth may be curved.
+BeamSurface surface_through(const PlanePoints& points) {
+  const Points& rough = points.rough;
+  BeamSurface surface = plane_through(points.smooth);
+  const std::size_t num = std::min(rough.size(), num_near);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < num; ++i)
+    squares += std::pow(surface.normal.dot(rough[i] - surface.middle), 2) / static_cast<double>(num);
+  surface.roughness = std::max(surface.roughness, std::sqrt(squares));
+  return surface;
 }
 
 }  // namespace
@@ -98,9 +136,11 @@ std::vector<BeamSurface> surfaces_around(const Eigen::Vector3d& direction,
   Points near = near_direction(direction, points_in_cam, most);
   std::vector<BeamSurface> surfaces;
   while (near.size() >= enough) {
-    const Points of_one = taken_plane(near);
-    if (of_one.size() < enough) break;
-    if (surround(direction, of_one)) surfaces.push_back(plane_through(of_one));
+    const PlanePoints of_one = plane_points(direction, near);
+    if (of_one.smooth.size() < enough) break;
+    if (surround(direction, of_one.smooth)) surfaces.push_back(surface_through(of_one));
+    for (const Points& taken : {of_one.rough, of_one.smooth})
+      std::erase_if(near, [&](const Eigen::Vector3d& point) { return std::ranges::find(taken, point) != taken.end(); });
   }
   return surfaces;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/localize/checks/beam_surfaces.h"
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/simulate/draws.h"
 
@@ -89,6 +90,21 @@ TEST(BeamSurfaces, ABoardBeforeAWallDoesNotHideTheScale) {
   EXPECT_LT(worst, 5.0);
   EXPECT_LE(beyond_3_sigma, 2) << worst;
   EXPECT_GE(sure, 30);
+}
+
+/// Points that lie just behind an edge are within 1 % of the wall before it, and among the six nearest: they tilted it.
+TEST(BeamSurfaces, WhatLiesBehindAnEdgeIsNoPartOfTheWall) {
+  constexpr double wall_m = 2.0, edge_m = 0.12, slope = 1.2;
+  std::vector<Eigen::Vector3d> points;
+  for (const double x : {-0.08, 0.08})
+    for (const double y : {-0.08, 0.08}) points.emplace_back(x, y, wall_m);
+  for (const double y : {-0.15, 0.0, 0.15}) points.emplace_back(-0.15, y, wall_m);
+  for (const double y : {0.0, 0.05}) points.emplace_back(edge_m + 0.015, y, wall_m + 0.015 * slope);
+  const std::vector<BeamSurface> surfaces = surfaces_around(Eigen::Vector3d::UnitZ(), points);
+  ASSERT_FALSE(surfaces.empty());
+  EXPECT_NEAR(std::abs(surfaces.front().normal.z()), 1.0, 1e-9);
+  EXPECT_NEAR(surfaces.front().middle.z(), wall_m, 1e-9);
+  EXPECT_GT(surfaces.front().roughness, 0.0);  // it may as well be curved
 }
 
 }  // namespace

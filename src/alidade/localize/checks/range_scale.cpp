@@ -40,6 +40,19 @@ struct MeanScale {
   double log_scale = 0.0, sigma = 0.0;
 };
 
+/// The same in the order of where they meet the surface: its shape is the same whenever the beam comes back.
+std::vector<BeamScale> by_place(std::span<const BeamScale> scales) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const BeamScale& each : scales) middle += each.met_in_world / static_cast<double>(scales.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const BeamScale& each : scales)
+    scatter += (each.met_in_world - middle) * (each.met_in_world - middle).transpose();
+  const Eigen::Vector3d along = symmetric_eigen3(scatter).vectors.col(2);
+  std::vector<BeamScale> ordered(scales.begin(), scales.end());
+  std::ranges::stable_sort(ordered, {}, [&](const BeamScale& each) { return along.dot(each.met_in_world); });
+  return ordered;
+}
+
 MeanScale mean_of_blocks(std::span<const BeamScale> scales) {
   double sum = 0.0, squares = 0.0;
   for (std::size_t i = 0; i < num_blocks; ++i) {
@@ -53,23 +66,30 @@ MeanScale mean_of_blocks(std::span<const BeamScale> scales) {
   return {mean, std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0))};
 }
 
+constexpr double instrument_m = 0.1;  ///< An offset of the readings is about as long as that, from its other end.
+
 /// Something of the beam or its readings that is not as given: scale_i = S + x_i · by, with x of a reading the more,
 /// the more that changes its scale.
 struct BeamFault {
   Eigen::Index num = 1;  ///< Of its numbers.
   Eigen::VectorXd (*x_of)(const BeamScale&);
   double clear, half_clear;  ///< Of T² with nine degrees of freedom: as seldom as 3.5σ and 2σ of a normal distribution.
+  double ordinary;           ///< σ of one that is there. [m, rad, s]
   bool is_length = false;  ///< As the shape of a surface is, which is the same from near and far.
 };
 /// All readings are too long by one length.
-const BeamFault offset_fault{
-    1, [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_offset).eval(); }, 28.6, 5.4, true};
+const BeamFault offset_fault{1,
+                             [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_offset).eval(); },
+                             28.6,
+                             5.4,
+                             instrument_m,
+                             true};
 /// The beam points elsewhere.
 const BeamFault direction_fault{2, [](const BeamScale& each) -> Eigen::VectorXd { return each.of_direction; }, 52.3,
-                                10.5};
+                                10.5, 0.1};
 /// The readings' clock is late.
 const BeamFault clock_fault{1, [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_time).eval(); },
-                            28.6, 5.4};
+                            28.6, 5.4, 0.1};
 
 struct FaultFit {
   double scale = 1.0, left2 = 0.0;   ///< What is left over, squared.
@@ -108,12 +128,12 @@ std::optional<FaultFit> fault_fit(const BeamFault& fault, std::span<const BeamSc
 struct FoundFault {
   FaultFit fit;
   double sigma_log_scale = 0.0, T2 = 0.0;
-  Eigen::VectorXd sigma_by;
+  Eigen::MatrixXd cov_by;
 };
 
 /// `of_surface`: relative error of each scale by the surface's shape, which may follow x.
-std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const BeamScale> scales,
-                                      const Eigen::MatrixXd& of_beam, double of_surface) {
+std::optional<FoundFault> found_by_blocks(const BeamFault& fault, std::span<const BeamScale> scales,
+                                          const Eigen::MatrixXd& of_beam, double of_surface) {
   const auto fit = fault_fit(fault, scales, 0, 0);
   if (!fit || !(fit->scale > 0.0)) return std::nullopt;
   FoundFault found;
@@ -132,12 +152,19 @@ std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const Be
   const Eigen::VectorXd of_x = fault.is_length ? Eigen::VectorXd(fit->mean / both_ways) : fit->spread;
   cov.diagonal() += (of_surface * fit->scale * of_x.cwiseInverse()).cwiseAbs2();
   found.sigma_log_scale = std::sqrt(share * of_scale);
-  found.sigma_by = cov.diagonal().cwiseSqrt();
+  found.cov_by = cov;
   found.T2 = fit->by.dot(Ldlt(cov).inverse() * fit->by);
   return found;
 }
 
-constexpr double instrument_m = 0.1;  ///< An offset of the readings is about as long as that, from its other end.
+/// By blocks of time or of the surface, whichever differ more.
+std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const BeamScale> scales,
+                                      const Eigen::MatrixXd& of_beam, double of_surface) {
+  const auto by_time = found_by_blocks(fault, scales, of_beam, of_surface),
+             of_places = found_by_blocks(fault, by_place(scales), of_beam, of_surface);
+  if (!by_time || !of_places) return std::nullopt;
+  return of_places->T2 < by_time->T2 ? of_places : by_time;
+}
 
 /// How much of the scale an offset of the readings would be that is as long as an instrument, measured from its other
 /// end, where no covariance of the beam and not the readings themselves exclude it: a surface's shape, or a distance
@@ -146,10 +173,26 @@ double hidden_offset(std::span<const BeamScale> scales, const Beam& beam, const 
                      double scale) {
   constexpr double sigmas = 3.3;  // an offset so large is beyond 2σ, that is in doubt, in five of six cases
   if (beam.cov.diagonal().maxCoeff() > 0.0) return 0.0;
-  if (offset && sigmas * offset->sigma_by[0] < instrument_m) return 0.0;
+  if (offset && sigmas * std::sqrt(offset->cov_by(0, 0)) < instrument_m) return 0.0;
   double of_offset = 0.0;
   for (const BeamScale& each : scales) of_offset += std::abs(each.of_offset) / static_cast<double>(scales.size());
   return instrument_m * of_offset / scale;
+}
+
+/// What a fault that the readings hardly show and do not exclude may be of the scale, relative: of so many beams one
+/// reads from its housing's other end, say, or was moved since it was calibrated. Its size is that by the readings and
+/// by what is ordinary; that it is there has the probability by Bayes' rule.
+double possible_share(const BeamFault& fault, const FoundFault& found, const Beam& beam, double scale) {
+  constexpr double share_of_calibrated = 0.2, share_of_others = 0.5, surest = 50.0;
+  const double share = beam.cov.diagonal().maxCoeff() > 0.0 ? share_of_calibrated : share_of_others;
+  const Eigen::VectorXd &by = found.fit.by, slope = found.fit.mean / scale;
+  const Eigen::MatrixXd ordinary = fault.ordinary * fault.ordinary * Eigen::MatrixXd::Identity(fault.num, fault.num);
+  const Eigen::MatrixXd both = found.cov_by + ordinary, kept = ordinary * Ldlt(both).inverse();
+  const double log_ratio = 0.5 * std::log(found.cov_by.determinant() / both.determinant()) +
+                           0.5 * (found.T2 - by.dot(Ldlt(both).inverse() * by));
+  const double odds = share / (1.0 - share) * std::exp(std::min(log_ratio, surest));
+  const double size2 = std::pow(slope.dot(kept * by), 2) + slope.dot(kept * found.cov_by * slope);
+  return std::sqrt(odds / (1.0 + odds) * size2);
 }
 
 /// The data as they are without a fault of this size.
@@ -178,8 +221,9 @@ struct Cause {
 };
 
 /// It is linear for small ones only: a beam that points elsewhere meets other surfaces.
+/// `num_given`: how many readings have a surface as they are.
 std::optional<Cause> cause_of(const RangeData& data, const BeamFault& fault, FoundFault found,
-                              const Eigen::MatrixXd& of_beam) {
+                              const Eigen::MatrixXd& of_beam, std::size_t num_given) {
   constexpr int rounds = 3;
   constexpr double enough = 0.5;
   Cause cause{&fault, std::move(found), {}, 0.0};
@@ -187,7 +231,7 @@ std::optional<Cause> cause_of(const RangeData& data, const BeamFault& fault, Fou
   for (int round = 0; round < rounds; ++round) {
     const CorrectedData corrected = without_fault(data, fault, cause.by);
     std::vector<BeamScale> scales = scales_of({corrected.readings, corrected.beam, data.path, data.map}).scales;
-    if (static_cast<double>(scales.size()) < enough * static_cast<double>(data.readings.size())) return std::nullopt;
+    if (static_cast<double>(scales.size()) < enough * static_cast<double>(num_given)) return std::nullopt;
     std::vector<double> logs, sizes;
     for (const BeamScale& each : scales) logs.push_back(each.log_scale);
     const double median = median_of(logs);
@@ -205,7 +249,7 @@ std::optional<Cause> cause_of(const RangeData& data, const BeamFault& fault, Fou
 }
 
 /// Where the readings say that they are all too long or late, or that the beam points elsewhere, that which explains
-/// most is estimated; where they half say so, its effect is in σ.
+/// most is estimated; where they half say so, its effect is in σ, where they do not what it may be.
 void add_faults(const RangeData& data, std::span<const BeamScale> scales, double of_surface, ReadScale& read) {
   const Beam& beam = data.beam;
   const Eigen::Vector3d along = beam.direction_in_cam;
@@ -218,7 +262,7 @@ void add_faults(const RangeData& data, std::span<const BeamScale> scales, double
   std::optional<Cause> best;
   const auto compare = [&](const BeamFault& fault, const std::optional<FoundFault>& found, const auto& of_beam) {
     if (!found || !(found->T2 > fault.clear)) return;
-    auto cause = cause_of(data, fault, *found, of_beam);
+    auto cause = cause_of(data, fault, *found, of_beam, read.num_used + read.num_rejected);
     if (cause && (!best || cause->misfit < best->misfit)) best = std::move(cause);
   };
   compare(offset_fault, offset, along_beam);
@@ -233,15 +277,17 @@ void add_faults(const RangeData& data, std::span<const BeamScale> scales, double
     return;
   }
   const double before = read.scale;
-  const auto doubt = [&](const std::optional<FoundFault>& found, const BeamFault& fault, double believed) {
-    if (found && found->T2 > fault.half_clear)
-      read.sigma_rel = std::hypot(read.sigma_rel, believed * std::log(found->fit.scale / before));
+  const auto count = [&](const BeamFault& fault, const std::optional<FoundFault>& found, double believed) {
+    if (!found) return;
+    const double doubted = believed * std::log(found->fit.scale / before);
+    read.sigma_rel = std::hypot(read.sigma_rel,
+                                found->T2 > fault.half_clear ? doubted : possible_share(fault, *found, beam, before));
   };
   // Where hardly anything determines an offset, what an instrument has is surer.
-  const double known = offset ? std::pow(offset->sigma_by[0] / instrument_m, 2) : 0.0;
-  doubt(offset, offset_fault, 1.0 / (1.0 + known));
-  doubt(direction, direction_fault, 1.0);
-  doubt(clock, clock_fault, 1.0);
+  const double known = offset ? offset->cov_by(0, 0) / (instrument_m * instrument_m) : 0.0;
+  count(offset_fault, offset, 1.0 / (1.0 + known));
+  count(direction_fault, direction, 1.0);
+  count(clock_fault, clock, 1.0);
   read.hidden_offset_rel = hidden_offset(scales, beam, offset, before);
 }
 
@@ -258,7 +304,8 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   if (scales.size() < num_blocks) return std::nullopt;
   double roughness = 0.0;
   for (const BeamScale& each : scales) roughness += each.roughness / static_cast<double>(scales.size());
-  const MeanScale mean = mean_of_blocks(scales);
+  const MeanScale of_time = mean_of_blocks(scales), of_places = mean_of_blocks(by_place(scales));
+  const MeanScale mean = of_places.sigma > of_time.sigma ? of_places : of_time;
   ReadScale read{std::exp(mean.log_scale), 0.0, scales.size(), num_given - scales.size()};
   // A curved surface is on one side of every plane through its points, by about as much as they are off it.
   read.sigma_rel = std::hypot(mean.sigma, sigma_by_beam(data), roughness);

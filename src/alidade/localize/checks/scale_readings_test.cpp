@@ -171,7 +171,8 @@ TEST(SensorScale, WhatIsNotKnownOfTheBeamIsCounted) {
     const auto read = scale_by_range(readings, beam, by_camera(1).path, by_camera(1).map);
     ASSERT_TRUE(read);
     EXPECT_NEAR(std::log(read->scale / true_scale_of(1)), 0.0, 3.0 * read->sigma_rel) << off_m;
-    EXPECT_LT(read->sigma_rel, 0.02);
+    // At twice its σ it may as well be another beam.
+    EXPECT_LT(read->sigma_rel, off_m == 0.0 ? 0.03 : 0.1);
   }
 }
 

@@ -14,19 +14,22 @@ using Eigen::Index;
 
 constexpr double no_limit = 1e9;
 
-/// What is left after a time t of s(0), where ds/dt = −s / (1 + |s|): ln |s| + |s| falls by t.
+/// What is left after a time t of s(0), where ds/dt = −s / (1 + |s|): ln |s| + |s| falls by t. Lambert's W, by steps of
+/// the fourth order: F. N. Fritsch, R. E. Shafer & W. P. Crowley, "Solution of the transcendental equation we^w = x",
+/// 1973.
 double soft_decay(double s, double t) {
-  constexpr int max_steps = 60;
-  constexpr double tiny = 1e-300, precise = 1e-14;
+  constexpr int max_steps = 10;
+  constexpr double tiny = 1e-300, near = 1e-4;
   const double before = std::abs(s);
   if (!(before > tiny)) return s;
   const double sum = std::log(before) + before - t;
   const double most = std::exp(std::min(sum, 0.0));
-  double left = sum > 1.0 ? sum - std::log(sum) : most / (1.0 + most);  // below the root, as Newton's steps stay
+  double left = sum > 1.0 ? sum - std::log(sum) : most / (1.0 + most);
   for (int i = 0; i < max_steps; ++i) {
-    const double by = (std::log(left) + left - sum) * left / (1.0 + left);
-    left -= by;
-    if (std::abs(by) < precise * left) break;
+    const double z = sum - std::log(left) - left, q = 2.0 * (1.0 + left) * (1.0 + left + 2.0 / 3.0 * z);
+    const double by = z / (1.0 + left) * (q - z) / (q - 2.0 * z);
+    left *= 1.0 + by;
+    if (std::abs(by) < near) break;  // what is left of it is the fourth power
   }
   return std::copysign(left, s);
 }

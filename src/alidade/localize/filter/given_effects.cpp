@@ -24,12 +24,15 @@ GivenEffects::GivenEffects(const Camera& camera, std::span<const int> estimated,
   counts_ = !cov_.isZero(0.0);
   information_.setZero(num, num);
   score_.setZero(num);
-  const auto padded = static_cast<Eigen::Index>(capacity);
+  constexpr int panel = StateCovariance::panel;
+  const auto padded = static_cast<Eigen::Index>((capacity + panel - 1) / panel * panel);
   M_.setZero(padded, num);
   change_.setZero(padded, num);
   G_.setZero(padded, num);
   by_point_.setZero(padded, num);
   of_left_.setZero(num, num);
+  rows_.reserve(static_cast<std::size_t>(capacity));
+  for (std::vector<double>& each : weights_) each.resize(static_cast<std::size_t>(capacity));
   max_seen_ = static_cast<std::size_t>(observations);
   seen_.reserve(max_seen_);
 }
@@ -158,11 +161,16 @@ void GivenEffects::finish(const StateCovariance& P) {
     for (int k = 0; k < seen.num; ++k)
       for (Eigen::Index c = 0; c < G_.cols(); ++c)
         G_(seen.columns[static_cast<std::size_t>(k)], c) += seen.weight * seen.H.col(k).dot(seen.D.col(c));
-  change_.topRows(dim).setZero();
-  for (int j = 0; j < dim; ++j) {
-    if (G_.row(j).isZero(0.0)) continue;
-    const Eigen::Map<const Eigen::VectorXd> column(P.column(j), dim);
-    for (Eigen::Index c = 0; c < G_.cols(); ++c) change_.col(c).head(dim) -= G_(j, c) * column;
+  rows_.clear();
+  for (int j = 0; j < dim; ++j)
+    if (!G_.row(j).isZero(0.0)) rows_.push_back(j);
+  for (Eigen::Index c = 0; c < G_.cols(); c += 2) {  // G's last column is twice there where their number is odd
+    const Eigen::Index next = std::min(c + 1, G_.cols() - 1);
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      weights_[0][k] = -G_(rows_[k], c);
+      weights_[1][k] = -G_(rows_[k], next);
+    }
+    P.product({rows_, weights_[0].data(), weights_[1].data()}, change_.col(c).data(), change_.col(next).data());
   }
   for (const Seen& seen : seen_) {
     const Derivatives after = seen.D + product(seen, change_);

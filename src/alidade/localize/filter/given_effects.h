@@ -73,6 +73,8 @@ class GivenEffects {
   Eigen::MatrixXd cov_, information_;
   Eigen::VectorXd score_;
   Columns M_, change_, G_;
+  std::vector<int> rows_;  ///< Of G those that are not zero, and two columns of them.
+  std::array<std::vector<double>, 2> weights_;
   Columns by_point_;         ///< What each feature adds to the score, in the row of its first number.
   Eigen::MatrixXd of_left_;  ///< Σ s sᵀ of those that have left.
   std::vector<Seen> seen_;

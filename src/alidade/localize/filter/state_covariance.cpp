@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <utility>
 
@@ -81,8 +82,13 @@ void StateCovariance::remove(int offset, int count) {
 }
 
 void StateCovariance::product(const Rows& rows, double* x0, double* x1) const {
-  weigh_columns(P_.get(), stride(), rows.columns.data(), static_cast<int>(rows.columns.size()), rows.h0, rows.h1, dim_,
-                x0, x1);
+  std::array<double, 2 * panel> x{};
+  for (int at = 0; at < dim_; at += panel) {
+    weigh_panel(P_.get() + at, stride(), rows.columns.data(), static_cast<int>(rows.columns.size()), rows.h0, rows.h1,
+                x.data());
+    std::copy_n(x.data(), panel, x0 + at);
+    std::copy_n(x.data() + panel, panel, x1 + at);
+  }
 }
 
 void StateCovariance::products(std::span<const Rows> rows) {

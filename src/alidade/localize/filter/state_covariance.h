@@ -55,7 +55,7 @@ class StateCovariance {
   };
   /// X = (P − W Wᵀ) Hᵀ for all state rows; 2 columns for each of `rows`.
   void products(std::span<const Rows> rows);
-  /// The same without W, into columns that the caller holds (dim() components each).
+  /// The same without W, into columns that the caller holds (dim() components each, rounded up to whole panels).
   void product(const Rows& rows, double* x0, double* x1) const;
   /// H (P − W Wᵀ) Hᵀ.
   [[nodiscard]] Eigen::Matrix2d innovation_covariance(const Rows& rows) const;

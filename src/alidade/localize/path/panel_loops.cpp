@@ -135,20 +135,6 @@ ALIDADE_VECTOR_CLONES void loop_subtract_products(const double* w, const double*
   }
 }
 
-ALIDADE_VECTOR_CLONES void loop_weigh_columns(const double* P, std::size_t stride, const int* columns, int num,
-                                              const double* h0, const double* h1, int rows, double* x0, double* x1) {
-  std::fill_n(x0, rows, 0.0);
-  std::fill_n(x1, rows, 0.0);
-  for (int c = 0; c < num; ++c) {
-    const double* column = P + static_cast<std::size_t>(columns[c]) * stride;
-    const double a = h0[c], b = h1[c];
-    for (int i = 0; i < rows; ++i) {
-      x0[i] += a * column[i];
-      x1[i] += b * column[i];
-    }
-  }
-}
-
 ALIDADE_VECTOR_CLONES void loop_weigh_panel(const double* P, std::size_t stride, const int* columns, int num,
                                             const double* h0, const double* h1, double* x) {
   Four x0_low = {}, x0_high = {}, x1_low = {}, x1_high = {};
@@ -228,10 +214,6 @@ void add_three(const double* K, const double* U, std::size_t stride, const doubl
   loop_add_three(K, U, stride, u, k, num, column);
 }
 void subtract_products(const double* w, const double* h, int num, double* x) { loop_subtract_products(w, h, num, x); }
-void weigh_columns(const double* P, std::size_t stride, const int* columns, int num, const double* h0, const double* h1,
-                   int rows, double* x0, double* x1) {
-  loop_weigh_columns(P, stride, columns, num, h0, h1, rows, x0, x1);
-}
 void weigh_panel(const double* P, std::size_t stride, const int* columns, int num, const double* h0, const double* h1,
                  double* x) {
   loop_weigh_panel(P, stride, columns, num, h0, h1, x);

@@ -45,10 +45,7 @@ void add_three(const double* K, const double* U, std::size_t stride, const doubl
                double* column);
 /// x −= Σ_k w_k h_k for a panel: four columns of x at a time, whose factors of each k stand together.
 void subtract_products(const double* w, const double* h, int num, double* x);
-/// x0, x1 = P Hᵀ of one measurement: columns of P, weighted.
-void weigh_columns(const double* P, std::size_t stride, const int* columns, int num, const double* h0, const double* h1,
-                   int rows, double* x0, double* x1);
-/// The same for 8 rows.
+/// x0, x1 = P Hᵀ of one measurement: columns of P, weighted, for 8 rows.
 void weigh_panel(const double* P, std::size_t stride, const int* columns, int num, const double* h0, const double* h1,
                  double* x);
 /// S −= H W Wᵀ Hᵀ.

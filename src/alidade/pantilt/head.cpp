@@ -128,7 +128,13 @@ Eigen::Matrix<double, 3, 6> TurnedHead::J_point_base(const Eigen::Vector3d& poin
   return J;
 }
 
-Eigen::Matrix<double, 3, num_head_params> TurnedHead::J_point_head(const Eigen::Vector3d& point_in_cam) const {
+Eigen::Vector4d TurnedHead::reading_waves() const {
+  return {std::cos(readings_rad.x()), std::sin(readings_rad.x()), std::cos(readings_rad.y()),
+          std::sin(readings_rad.y())};
+}
+
+Eigen::Matrix<double, 3, num_head_params> TurnedHead::J_point_head(const Eigen::Vector3d& point_in_cam,
+                                                                   const Eigen::Vector4d& waves) const {
   const Eigen::Vector3d point_in_tilt = cam_from_tilt_rotation.transpose() * point_in_cam;
   const Eigen::Vector3d from_tilt_axis = point_in_tilt + tilt_to_cam_m;
   const Eigen::Vector3d from_pan_axis = tilt_from_pan_rotation.transpose() * from_tilt_axis + pan_to_tilt_m;
@@ -142,8 +148,8 @@ Eigen::Matrix<double, 3, num_head_params> TurnedHead::J_point_head(const Eigen::
     const Eigen::Vector3d by_angle = J_readings.col(axis) / angle_per_reading[axis];
     J.col(15 + axis) = -scales[axis] * by_angle;
     J.col(17 + axis) = readings_from_zero_rad[axis] * by_angle;
-    J.col(20 + 2 * axis) = scales[axis] * std::cos(readings_rad[axis]) * by_angle;
-    J.col(21 + 2 * axis) = scales[axis] * std::sin(readings_rad[axis]) * by_angle;
+    J.col(20 + 2 * axis) = scales[axis] * waves[2 * axis] * by_angle;
+    J.col(21 + 2 * axis) = scales[axis] * waves[2 * axis + 1] * by_angle;
   }
   J.col(19) = -cam_from_tilt_rotation * tilt_from_pan_rotation.col(2).cross(from_tilt_axis);
   return J;

@@ -101,8 +101,14 @@ struct TurnedHead {
   [[nodiscard]] Eigen::Matrix<double, 3, 2> J_point_readings(const Eigen::Vector3d& point_in_cam) const;
   /// ∂ point_in_cam / ∂ the pose of its base: the first six of the head's parameters.
   [[nodiscard]] Eigen::Matrix<double, 3, 6> J_point_base(const Eigen::Vector3d& point_in_base) const;
-  /// ∂ point_in_cam / ∂ the head's parameters.
-  [[nodiscard]] Eigen::Matrix<double, 3, num_head_params> J_point_head(const Eigen::Vector3d& point_in_cam) const;
+  /// cos and sin of the reading of pan, then of tilt: derivatives of the encoder's error of one period a turn.
+  [[nodiscard]] Eigen::Vector4d reading_waves() const;
+  /// ∂ point_in_cam / ∂ the head's parameters. `waves`: reading_waves(), computed once for many points.
+  [[nodiscard]] Eigen::Matrix<double, 3, num_head_params> J_point_head(const Eigen::Vector3d& point_in_cam,
+                                                                       const Eigen::Vector4d& waves) const;
+  [[nodiscard]] Eigen::Matrix<double, 3, num_head_params> J_point_head(const Eigen::Vector3d& point_in_cam) const {
+    return J_point_head(point_in_cam, reading_waves());
+  }
 };
 
 struct HeadPixel {

@@ -198,6 +198,7 @@ std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const 
   const RigHead& rig_head = state.heads[which.head];
   const Rigid3& world_from_board = state.world_from_board[which.board];
   const TurnedHead turned(rig_head.head, true_reading(problem, state, view));
+  const Eigen::Vector4d waves = turned.reading_waves();
   const Eigen::Matrix3d world_from_board_rotation = world_from_board.rotation.toRotationMatrix();
   const Eigen::Matrix3d cam_from_board_rotation = turned.cam_from_world_rotation * world_from_board_rotation;
   std::vector<Eigen::Vector3d> points_in_cam;
@@ -217,8 +218,8 @@ std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const 
     const Eigen::Matrix<double, 2, 3> J_in_board = J * cam_from_board_rotation;
     out.r.segment<2>(row) = (seen[i]->px - corner.px) / problem.sigma_px;
     const Eigen::Matrix2d by_readings = J * turned.J_point_readings(points_in_cam[i]);
-    fill_row(free, J * turned.J_point_head(points_in_cam[i]), by_readings, *seen[i], rig_head.camera, problem, which,
-             out.J_head.middleRows<2>(row));
+    fill_row(free, J * turned.J_point_head(points_in_cam[i], waves), by_readings, *seen[i], rig_head.camera, problem,
+             which, out.J_head.middleRows<2>(row));
     out.J_board.block<2, 3>(row, 0) = J_in_board;
     out.J_board.block<2, 3>(row, 3) =
         -J_in_board * cross_matrix(problem.points_in_board[static_cast<std::size_t>(corner.index)]);

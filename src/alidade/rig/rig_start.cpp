@@ -14,14 +14,6 @@ namespace {
 
 constexpr double cap_rad = 0.5;  // what is farther off counts no more: a wrong view is a wrong view
 
-Head head_of(const MountingStart& mounting) {
-  Head head;
-  head.cam_from_tilt = mounting.cam_from_tilt;
-  head.encoder.pan_scale = mounting.pan_scale;
-  head.encoder.tilt_scale = mounting.tilt_scale;
-  return head;
-}
-
 using Groups = std::map<std::size_t, std::vector<TurnedView>>;  // by board
 
 Groups groups_of(std::span<const TurnedView> views) {
@@ -33,46 +25,67 @@ Groups groups_of(std::span<const TurnedView> views) {
   return groups;
 }
 
-/// The board's pose in the base, one per view.
-std::vector<Eigen::Quaterniond> base_from_board(const std::vector<TurnedView>& views, const Head& head) {
-  std::vector<Eigen::Quaterniond> turned;
-  for (const TurnedView& view : views)
-    turned.push_back(world_from_cam(head, view.pan_tilt_rad).rotation * view.cam_from_board);
+using Rotations = std::vector<Eigen::Quaterniond>;
+
+/// What the encoders turn each view of a group by, where they count so.
+std::vector<Rotations> base_from_tilt(const Groups& groups, double pan_scale, double tilt_scale) {
+  Head head;
+  head.encoder.pan_scale = pan_scale;
+  head.encoder.tilt_scale = tilt_scale;
+  std::vector<Rotations> turns;
+  for (const auto& [board, views] : groups) {
+    turns.emplace_back();
+    for (const TurnedView& view : views) turns.back().push_back(world_from_cam(head, view.pan_tilt_rad).rotation);
+  }
+  return turns;
+}
+
+/// The board's rotation in the base, one per view.
+Rotations base_from_board(const std::vector<TurnedView>& views, const Rotations& base_from_tilt,
+                          const Eigen::Quaterniond& cam_from_tilt) {
+  Rotations turned;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    turned.push_back(base_from_tilt[i] * (cam_from_tilt.conjugate() * views[i].cam_from_board));
   return turned;
 }
 
 /// The one of them that the others are nearest to, and the sum of the others' capped angles from it.
-std::pair<std::size_t, double> middle_of(const std::vector<Eigen::Quaterniond>& turned) {
+std::pair<std::size_t, double> middle_of(const Rotations& turned) {
   std::pair<std::size_t, double> best{0, std::numeric_limits<double>::infinity()};
   for (std::size_t i = 0; i < turned.size(); ++i) {
     double sum = 0.0;
-    for (const Eigen::Quaterniond& other : turned) sum += std::min(cap_rad, turned[i].angularDistance(other));
+    for (std::size_t k = 0; k < turned.size() && sum < best.second; ++k)
+      sum += std::min(cap_rad, turned[i].angularDistance(turned[k]));
     if (sum < best.second) best = {i, sum};
   }
   return best;
 }
 
-double misfit(const Groups& groups, const Head& head) {
+/// Not to its end beyond `limit`.
+double misfit(const Groups& groups, const std::vector<Rotations>& base_from_tilt,
+              const Eigen::Quaterniond& cam_from_tilt, double limit = std::numeric_limits<double>::infinity()) {
   double sum = 0.0;
-  for (const auto& [board, views] : groups) sum += middle_of(base_from_board(views, head)).second;
+  auto turns = base_from_tilt.begin();
+  for (auto group = groups.begin(); group != groups.end() && sum <= limit; ++group, ++turns)
+    sum += middle_of(base_from_board(group->second, *turns, cam_from_tilt)).second;
   return sum;
 }
 
 /// One robust Gauss–Newton step of the mounting: each view's rotation from its board's centre, by differences.
-Eigen::Vector3d refining_step(const Groups& groups, const MountingStart& mounting) {
+Eigen::Vector3d refining_step(const Groups& groups, const std::vector<Rotations>& base_from_tilt,
+                              const Eigen::Quaterniond& cam_from_tilt) {
   Eigen::Matrix3d H = 1e-9 * Eigen::Matrix3d::Identity();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
   constexpr double step = 1e-5;
-  std::array<Head, 4> heads;
-  heads.fill(head_of(mounting));
-  for (int k = 0; k < 3; ++k)
-    heads[static_cast<std::size_t>(k)].cam_from_tilt =
-        mounting.cam_from_tilt * exp_so3(step * Eigen::Vector3d::Unit(k));
+  auto turns = base_from_tilt.begin();
   for (const auto& [board, views] : groups) {
-    const std::vector<Eigen::Quaterniond> now = base_from_board(views, heads[3]);
+    const Rotations now = base_from_board(views, *turns, cam_from_tilt);
     const std::size_t middle = middle_of(now).first;
-    std::array<std::vector<Eigen::Quaterniond>, 3> near;
-    for (std::size_t k = 0; k < 3; ++k) near[k] = base_from_board(views, heads[k]);
+    std::array<Rotations, 3> near;
+    for (int k = 0; k < 3; ++k)
+      near[static_cast<std::size_t>(k)] =
+          base_from_board(views, *turns, cam_from_tilt * exp_so3(step * Eigen::Vector3d::Unit(k)));
+    ++turns;
     for (std::size_t i = 0; i < now.size(); ++i) {
       const Eigen::Vector3d r = log_so3(now[middle].conjugate() * now[i]);
       if (!(r.norm() < cap_rad)) continue;
@@ -179,29 +192,34 @@ MountingStart mounting_start(std::span<const TurnedView> views) {
   if (groups.empty()) return best;
   // Two encoders that count backwards are a head mounted upside down: of those that explain equally well, the one with
   // the smaller rotation, and the fewer backwards.
+  constexpr double enough = 1.001;  // the smallest factor below is 0.9996
   double least = std::numeric_limits<double>::infinity();
-  for (const Eigen::Quaterniond& turn : turns_of_a_cube()) {
-    for (const double pan_scale : {1.0, -1.0}) {
-      for (const double tilt_scale : {1.0, -1.0}) {
+  std::vector<Rotations> turns;
+  for (const double pan_scale : {1.0, -1.0}) {
+    for (const double tilt_scale : {1.0, -1.0}) {
+      const std::vector<Rotations> counted = base_from_tilt(groups, pan_scale, tilt_scale);
+      for (const Eigen::Quaterniond& turn : turns_of_a_cube()) {
         MountingStart trial = best;
         trial.cam_from_tilt = turn;
         trial.pan_scale = pan_scale;
         trial.tilt_scale = tilt_scale;
-        const double sum = misfit(groups, head_of(trial));
+        const double sum = misfit(groups, counted, turn, enough * least);
         const double turned = turn.angularDistance(Eigen::Quaterniond::Identity());
         const double cost = sum * (1.0 + 1e-3 * turned - 2e-4 * (pan_scale + tilt_scale)) + 1e-6 * turned;
-        if (cost < least) least = cost, best = trial;
+        if (cost < least) least = cost, best = trial, turns = counted;
       }
     }
   }
+  double sum = misfit(groups, turns, best.cam_from_tilt);
   for (int i = 0; i < 15; ++i) {
-    const Eigen::Vector3d step = refining_step(groups, best);
-    MountingStart trial = best;
-    trial.cam_from_tilt = (best.cam_from_tilt * exp_so3(step)).normalized();
-    if (!step.allFinite() || !(misfit(groups, head_of(trial)) < misfit(groups, head_of(best)))) break;
-    best = trial;
+    const Eigen::Vector3d step = refining_step(groups, turns, best.cam_from_tilt);
+    const Eigen::Quaterniond next = (best.cam_from_tilt * exp_so3(step)).normalized();
+    const double next_sum = step.allFinite() ? misfit(groups, turns, next) : sum;
+    if (!(next_sum < sum)) break;
+    best.cam_from_tilt = next;
+    sum = next_sum;
   }
-  best.misfit_rad = misfit(groups, head_of(best)) / best.num_compared;
+  best.misfit_rad = sum / best.num_compared;
   return best;
 }
 

@@ -30,10 +30,14 @@ const emptyFigures = () => {
     [...card.querySelectorAll('canvas')].some((canvas) => canvas.checkVisibility() && isBlank(canvas))).map((card) => card.id);
 };
 
+const pages = {}; // one a theme, in which the documents are shown one after the other
+
 export async function opensAndDraws({open, urlOf, documents}, name) {
   const {document} = documents[name], isRefused = name.endsWith('refused');
   for (const [width, theme] of [[1500, 'light'], [600, 'dark']]) {
-    const {page, faults, close} = await open(urlOf(name), {width, theme});
+    const {page, faults, show} = (pages[theme] ??= await open('about:blank', {width, theme}));
+    faults.length = 0;
+    await show(urlOf(name));
     await settled(page, {whole: theme === 'light'});
     assert.deepEqual(faults, []);
     assert.equal(await page.locator('[data-failed]').count(), 0, 'a figure failed');
@@ -46,7 +50,6 @@ export async function opensAndDraws({open, urlOf, documents}, name) {
     assert.deepEqual(await page.evaluate(emptyFigures), [], 'figures with nothing in them');
     const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
     assert.ok(over <= 1, `${over} px wider than the window`);
-    await close();
   }
 }
 

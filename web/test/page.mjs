@@ -48,9 +48,12 @@ export async function opened(browser, url, {width = 1280, height = 900, theme = 
     if (!/^(file|data|blob):/.test(request.url())) faults.push(`request: ${request.url()}`);
   });
   if (script) await page.addInitScript(script);
-  await page.goto(url);
-  if (url !== 'about:blank') await page.waitForFunction(() => document.documentElement.dataset.ready === '1');
-  return {page, faults, close: () => context.close()};
+  const show = async (address) => {
+    await page.goto(address);
+    if (address !== 'about:blank') await page.waitForFunction(() => document.documentElement.dataset.ready === '1');
+  };
+  await show(url);
+  return {page, faults, show, close: () => context.close()};
 }
 
 /** Draws all 3-D figures, also those far from the window, and waits for two frames; `whole`: scrolls through the page, for thumbnails are decoded in sight. */

@@ -41,7 +41,7 @@ FieldList sigma_fields(LocalizeConfig& config) {
       {.name = "sigma_times_s",
        .value = &config.sigma_times_s,
        .help = "σ of the frames' times, the same error for all [s]: counted in each pose by the camera's velocity (0: "
-               "exact, as where the frames themselves are the times)",
+               "exact, as where the frames themselves are the times); without it by how far an IMU's clock is off them",
        .limits = {.min = 0.0}},
       {.name = "sigma_a_m_s2",
        .value = &config.filter.sigma_a_m_s2,

@@ -130,7 +130,7 @@ struct LocalizeConfig {
   double sigma_depth = 0.5;                ///< Of those, relative.
   std::optional<double> sigma_px = {};     ///< Of a pixel coordinate; in images the least of a match. None: 0.5, 0.11.
   std::optional<double> sigma_scale = {};  ///< Of the target's size, relative: counted. None: the target's own.
-  std::optional<double> sigma_times_s = {};  ///< Of the frames' times, the same for all. 0: exact. None: not known.
+  std::optional<double> sigma_times_s = {};  ///< Of the frames' times, all alike. 0: exact. None: by an IMU's clock.
   std::optional<LocalizeStart> start = {};   ///< Else from the target, else the first camera is the world, up to scale.
   LocalizeTarget target = {};
   std::optional<SavedMap> map = {};  ///< Of an earlier run, to begin in, instead of a target; its frame is the path's.

@@ -40,11 +40,10 @@ Eigen::VectorXd by_scale(const MovingProblem& problem, const Rig& rig, double si
   return moved;
 }
 
-/// What one σ of each of the similarity's seven numbers moves, about the middle of the true path: there they are
-/// independent. The reference moves, too.
+/// What each of seven independent errors of one σ of the similarity moves. The reference moves, too.
 Eigen::MatrixXd by_similarity(const MovingProblem& problem, const Rig& rig, const PathMatch& match) {
   Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(num_head_params * static_cast<Eigen::Index>(problem.placed.size()), 7);
-  const Eigen::Matrix3d turn = Llt(match.cov_rotation).lower();
+  const Eigen::Matrix<double, 7, 7> by = Llt(match.cov.topLeftCorner<7, 7>()).lower();
   for (std::size_t h = 0; h < problem.placed.size(); ++h) {
     if (!problem.placed[h]) continue;
     const Head& head = rig.heads[h].head;
@@ -52,10 +51,10 @@ Eigen::MatrixXd by_similarity(const MovingProblem& problem, const Rig& rig, cons
     const Eigen::Matrix3d base_from_world = head.world_from_base.rotation.conjugate().toRotationMatrix();
     const Eigen::Vector3d base = head.world_from_base.translation - match.middle;
     const Eigen::Vector3d centre = cam_centre_in_world(head, problem.readings[h]) - match.middle;
-    moved.block<3, 3>(at, 0) = match.sigma_translation_m * base_from_world;
-    moved.block<3, 3>(at, 3) = -base_from_world * cross_matrix(base) * turn;
-    moved.block<3, 3>(at + base_rotation_param, 3) = base_from_world * turn;
-    moved.block<3, 1>(at, 6) = match.sigma_scale * (base_from_world * centre);
+    Eigen::Matrix<double, 3, 7> place;
+    place << base_from_world, -base_from_world * cross_matrix(base), base_from_world * centre;
+    moved.block<3, 7>(at, 0) = place * by;
+    moved.block<3, 7>(at + base_rotation_param, 0) = base_from_world * by.middleRows<3>(3);
   }
   return moved;
 }
@@ -65,7 +64,7 @@ Eigen::MatrixXd by_similarity(const MovingProblem& problem, const Rig& rig, cons
 void take_covariance(const MovingProblem& problem, const MovingGiven& given, const Eigen::MatrixXd& cov_model,
                      const PathMatch* match, MovingTargetReport& report) {
   const double scale = match != nullptr ? match->truth_from_path.scale : 1.0;
-  const double sigma_scale = match != nullptr ? match->sigma_scale : 0.0;
+  const double sigma_scale = match != nullptr ? match->sigma_scale() : 0.0;
   report.assumed = given.assumed;
   report.focals = given.focals;
   report.cov_model = of_heads(problem, cov_model, scale);
@@ -83,6 +82,13 @@ void take_covariance(const MovingProblem& problem, const MovingGiven& given, con
   if (match == nullptr) return;
   const Eigen::MatrixXd moved = by_similarity(problem, report.rig, *match);
   report.rig.cov = of_cameras + moved * moved.transpose();
+  for (std::size_t h = 0; h < problem.placed.size(); ++h) {
+    const auto variance =
+        report.rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
+    report.sigma_world_m = std::max(report.sigma_world_m, std::sqrt(variance.head<3>().sum()));
+    report.sigma_world_rad =
+        std::max(report.sigma_world_rad, std::sqrt(variance.segment<3>(base_rotation_param).sum()));
+  }
 }
 
 }  // namespace alidade

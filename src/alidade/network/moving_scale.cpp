@@ -1,8 +1,10 @@
 #include "alidade/network/moving_scale.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/so3.h"
 
 namespace alidade {
 namespace {
@@ -41,19 +43,26 @@ double quantile(std::vector<double> values, double share) {
 double median(const std::vector<double>& values) { return quantile(values, 0.5); }
 double kept_most(const std::vector<double>& off) { return quantile(off, 0.9); }
 
+/// Without the tenth that is furthest off.
+Pairs most_of(const Pairs& pairs, const Similarity& fit) {
+  const std::vector<double> off = misses(pairs, fit);
+  const double most = kept_most(off);
+  Pairs kept;
+  for (std::size_t i = 0; i < off.size(); ++i) {
+    if (!(off[i] <= most)) continue;
+    kept.path.push_back(pairs.path[i]);
+    kept.truth.push_back(pairs.truth[i]);
+    kept.t_s.push_back(pairs.t_s[i]);
+  }
+  return kept;
+}
+
 /// Fitted again without the tenth that is furthest off, a few times: wrong stretches of a path do not pull, and a
 /// target that mostly stands still does not hide where it moved.
 std::optional<Similarity> robust_fit(const Pairs& pairs) {
   auto fit = aligned(pairs.path, pairs.truth, false);
   for (int round = 0; fit && round < 4; ++round) {
-    const std::vector<double> off = misses(pairs, *fit);
-    const double most = kept_most(off);
-    Pairs kept;
-    for (std::size_t i = 0; i < off.size(); ++i) {
-      if (!(off[i] <= most)) continue;
-      kept.path.push_back(pairs.path[i]);
-      kept.truth.push_back(pairs.truth[i]);
-    }
+    const Pairs kept = most_of(pairs, *fit);
     fit = aligned(kept.path, kept.truth, false);
   }
   return fit;
@@ -137,30 +146,125 @@ class ClockSearch {
   double mid_s_, offset_s_ = 0.0, rate_ = 1.0, least_ = hopeless;
 };
 
-/// How far a path is from the truth that it lies on.
-void fill_misses(const Pairs& pairs, double duration_s, PathMatch& match) {
+/// Residuals of the similarity and the clock, linearised: truth − path ≈ D x, x as in PathMatch::cov.
+struct MatchSystem {
+  Eigen::Matrix<double, 9, 9> N = Eigen::Matrix<double, 9, 9>::Zero();  ///< DᵀD over the number of moments.
+  Eigen::Matrix<double, 9, 1> g = Eigen::Matrix<double, 9, 1>::Zero();
+  std::vector<Eigen::Vector3d> left_m;
+
+  /// x of the first `num` alone; what cannot be determined stays.
+  [[nodiscard]] Eigen::VectorXd step(Eigen::Index num) const { return inverse(num) * g.head(num); }
+  /// Of N's first `num`, scaled to a unit diagonal; directions that nothing determines get a large variance.
+  [[nodiscard]] Eigen::MatrixXd inverse(Eigen::Index num) const {
+    const Eigen::VectorXd scale = N.diagonal().head(num).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const SymmetricEigen eigen = symmetric_eigen(scaled_by(scale, N.topLeftCorner(num, num)));
+    const Eigen::MatrixXd V = scale.asDiagonal() * eigen.vectors;
+    return V * eigen.values.cwiseMax(1e-9).cwiseInverse().asDiagonal() * V.transpose();
+  }
+};
+
+/// Velocity of the path at its moments, in the truth's world, per second of the truth: smoother than the truth's own.
+std::vector<Eigen::Vector3d> velocities(const Pairs& pairs, const Similarity& fit, double rate) {
+  const std::size_t num = pairs.path.size();
+  std::vector<Eigen::Vector3d> v(num, Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < num; ++i) {
+    const std::size_t before = i > 0 ? i - 1 : 0, after = std::min(num - 1, i + 1);
+    const double apart_s = rate * (pairs.t_s[after] - pairs.t_s[before]);
+    if (apart_s > 0.0) v[i] = fit.scale / apart_s * (fit.b_from_a.rotation * (pairs.path[after] - pairs.path[before]));
+  }
+  return v;
+}
+
+MatchSystem match_system(const Pairs& pairs, const PathMatch& match) {
+  MatchSystem system;
+  const Similarity& fit = match.truth_from_path;
+  const std::vector<Eigen::Vector3d> v = velocities(pairs, fit, match.rate);
+  const double share = 1.0 / static_cast<double>(pairs.path.size());
+  for (std::size_t i = 0; i < pairs.path.size(); ++i) {
+    const Eigen::Vector3d on_truth = fit.scale * (fit.b_from_a.rotation * pairs.path[i]) + fit.b_from_a.translation;
+    const Eigen::Vector3d arm = on_truth - match.middle, r = pairs.truth[i] - on_truth;
+    Eigen::Matrix<double, 3, 9> D;
+    D << Eigen::Matrix3d::Identity(), -cross_matrix(arm), arm, -v[i], -v[i] * (pairs.t_s[i] - match.middle_s);
+    system.N += share * D.transpose() * D;
+    system.g += share * D.transpose() * r;
+    system.left_m.push_back(r);
+  }
+  return system;
+}
+
+/// The clock of least squares near that of the search, with the similarity that belongs to it.
+void refine_clock(std::span<const double> t_s, std::span<const Eigen::Vector3d> path, const TrueTrack& truth,
+                  PathMatch& match) {
+  constexpr double max_step_s = 0.02, enough_s = 1e-6;
+  for (int round = 0; round < 10; ++round) {
+    const Pairs pairs = pairs_at(t_s, path, truth, match.offset_s, match.rate, 1);
+    const Eigen::VectorXd step = match_system(most_of(pairs, match.truth_from_path), match).step(9);
+    const double offset_s = std::clamp(step[7], -max_step_s, max_step_s);
+    const double drift = std::clamp(step[8], -1e-3, 1e-3);
+    PathMatch moved = match;
+    moved.rate += drift;
+    moved.offset_s += offset_s - drift * match.middle_s;
+    const Pairs again = pairs_at(t_s, path, truth, moved.offset_s, moved.rate, 1);
+    const auto fit = again.path.size() >= pairs.path.size() * 9 / 10 ? robust_fit(again) : std::nullopt;
+    if (!fit || !(trimmed_rms(misses(again, *fit)) <= trimmed_rms(misses(pairs, match.truth_from_path)))) return;
+    moved.truth_from_path = *fit;
+    match = moved;
+    if (std::abs(offset_s) < enough_s) return;
+  }
+}
+
+/// By how much the residuals' variance over blocks of time exceeds that of residuals which err each by itself, at most.
+double slowness(const std::vector<Eigen::Vector3d>& left_m) {
+  double all2 = 0.0, most = 1.0;
+  for (const Eigen::Vector3d& r : left_m) all2 += r.squaredNorm();
+  for (std::size_t block = 2; block <= left_m.size() / 8 && all2 > 0.0; block *= 2) {
+    double sum2 = 0.0;
+    for (std::size_t i = 0; i + block <= left_m.size(); i += block) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (std::size_t k = i; k < i + block; ++k) sum += left_m[k];
+      sum2 += sum.squaredNorm();
+    }
+    most = std::max(most, sum2 / all2);
+  }
+  return most;
+}
+
+/// Where the clock is not free: what is not known of it by so little that it is not named.
+void count_clock(const MatchSystem& system, double variance, PathMatch& match) {
+  constexpr double from_sigmas = 2.5;  // as of focal lengths
+  const Eigen::MatrixXd inverse = system.inverse(8);
+  const Eigen::VectorXd step = inverse * system.g.head<8>();
+  double all2 = 0.0;
+  for (const Eigen::Vector3d& r : system.left_m) all2 += r.squaredNorm() / static_cast<double>(system.left_m.size());
+  // Of what is left by the clock that is asked for: a wrong one must not hide in residuals of its own.
+  const double left = std::clamp(1.0 - step.dot(system.g.head<8>()) / all2, 1e-4, 1.0);
+  match.late_s = step[7];
+  match.sigma_late_s = std::sqrt(left * variance * inverse(7, 7));
+  if (std::abs(match.late_s) < from_sigmas * match.sigma_late_s) return;
+  const Eigen::VectorXd followed = inverse.col(7).head(7) / inverse(7, 7) * match.late_s;
+  match.cov.topLeftCorner<7, 7>() += followed * followed.transpose();
+}
+
+/// How far a path is from the truth that it lies on, and how well it determines similarity and clock.
+void fill_misses(const Pairs& pairs, double duration_s, bool clock_is_free, PathMatch& match) {
   const std::vector<double> off = misses(pairs, match.truth_from_path);
   match.median_m = median(off);
-  const Eigen::Vector3d mean = mean_of(pairs.truth);
+  match.middle = mean_of(pairs.truth);
   double sum2 = 0.0, extent2 = 0.0;
   for (std::size_t i = 0; i < off.size(); ++i) {
     sum2 += off[i] * off[i] / static_cast<double>(off.size());
-    extent2 += (pairs.truth[i] - mean).squaredNorm() / static_cast<double>(off.size());
+    extent2 += (pairs.truth[i] - match.middle).squaredNorm() / static_cast<double>(off.size());
   }
   match.rms_m = std::sqrt(sum2);
   match.extent_m = std::sqrt(extent2);
-  // What is left varies slowly: moments 2 s apart are taken to err on their own.
-  const double alone = std::max(3.0, duration_s / 2.0);
-  match.sigma_scale = match.median_m / match.extent_m / std::sqrt(alone);
-  match.sigma_translation_m = match.median_m / std::sqrt(alone);
-  match.middle = mean;
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& point : pairs.truth) {
-    const Eigen::Vector3d arm = point - mean;
-    inertia += (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose()) /
-               static_cast<double>(pairs.truth.size());
-  }
-  match.cov_rotation = match.sigma_translation_m * match.sigma_translation_m * inertia.inverse();
+  const MatchSystem system = match_system(most_of(pairs, match.truth_from_path), match);
+  // What is left varies slowly: moments 2 s apart, at the least, are taken to err on their own.
+  const double alone =
+      std::clamp(static_cast<double>(off.size()) / slowness(system.left_m), 3.0, std::max(3.0, duration_s / 2.0));
+  const double variance = match.median_m * match.median_m / alone;
+  const Eigen::Index num = clock_is_free ? 9 : 7;
+  match.cov.topLeftCorner(num, num) = variance * system.inverse(num);
+  if (!clock_is_free) count_clock(system, variance, match);
 }
 
 }  // namespace
@@ -177,13 +281,19 @@ std::optional<PathMatch> match_path(std::span<const double> t_s, std::span<const
   PathMatch match;
   match.offset_s = clock.offset_s();
   match.rate = clock.rate();
-  const Pairs pairs = pairs_at(t_s, path, truth, match.offset_s, match.rate, 1);
+  match.middle_s = 0.5 * (t_s.front() + t_s.back());
+  Pairs pairs = pairs_at(t_s, path, truth, match.offset_s, match.rate, 1);
   match.covered = clock.covered(pairs, 1);
   if (match.covered < 0.5) return std::nullopt;
   const auto fit = robust_fit(pairs);
   if (!fit) return std::nullopt;
   match.truth_from_path = *fit;
-  fill_misses(pairs, t_s.back() - t_s.front(), match);
+  match.middle = mean_of(pairs.truth);
+  if (clock_is_free) {
+    refine_clock(t_s, path, truth, match);
+    pairs = pairs_at(t_s, path, truth, match.offset_s, match.rate, 1);
+  }
+  fill_misses(pairs, t_s.back() - t_s.front(), clock_is_free, match);
   return match;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -14,13 +16,23 @@ struct PathMatch {
   Similarity truth_from_path;
   double offset_s = 0.0, rate = 1.0;  ///< Time of the truth = offset + rate · time of the path.
   double covered = 0.0;               ///< Share of the path that the truth covers.
-  double median_m = 0.0, rms_m = 0.0, sigma_scale = 0.0;
-  double extent_m = 0.0;  ///< RMS distance of the path from its centroid.
-  /// Of the similarity about that centroid, in the truth's world; what is left of the path varies slowly, and counts
-  /// so.
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  double sigma_translation_m = 0.0;  ///< Along each axis.
-  Eigen::Matrix3d cov_rotation = Eigen::Matrix3d::Zero();
+  double median_m = 0.0, rms_m = 0.0;
+  double extent_m = 0.0;                             ///< RMS distance of the path from its centroid.
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< The centroid, in the truth's world.
+  double middle_s = 0.0;                             ///< Amid the path's times.
+  /// About `middle` and `middle_s`, in the truth's world: translation [m], rotation [rad], ln scale, the clock's offset
+  /// [s] and rate. Where the clock is not free, the last two are 0, and what it is asked to be and not by much is
+  /// counted in the others. What is left of the path varies slowly, and counts so.
+  Eigen::Matrix<double, 9, 9> cov = Eigen::Matrix<double, 9, 9>::Zero();
+  /// By how much the truth's times are late where its clock is not free, and σ.
+  double late_s = 0.0, sigma_late_s = 0.0;
+
+  [[nodiscard]] double sigma_scale() const { return std::sqrt(cov(6, 6)); }
+  /// σ² of the truth's time at a time of the path.
+  [[nodiscard]] double variance_of_time(double path_s) const {
+    const double apart_s = path_s - middle_s;
+    return cov(7, 7) + apart_s * (2.0 * cov(7, 8) + apart_s * cov(8, 8));
+  }
 };
 
 /// The similarity and clock that bring a path (in any unit) onto a true one; all offsets at which the truth covers most

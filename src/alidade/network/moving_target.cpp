@@ -211,6 +211,12 @@ void take_truth(Placing& work, const PathMatch& match) {
     head.world_from_base = {(turn * head.world_from_base.rotation).normalized(),
                             moved(head.world_from_base.translation)};
     CameraClock& clock = report.cameras[h].clock;
+    if (work.problem.clocks_are_free) {
+      LocatedCamera& camera = report.cameras[h];
+      const double amid_s = work.problem.mid_s[h] - work.solved.state.offset_s[h];
+      camera.sigma_clock_s = std::sqrt(camera.sigma_clock_s * camera.sigma_clock_s + match.variance_of_time(amid_s));
+      camera.sigma_rate = std::hypot(camera.sigma_rate, std::sqrt(match.cov(8, 8)));
+    }
     clock = {match.offset_s + match.rate * clock.offset_s, match.rate * clock.rate};
   }
   for (Eigen::Vector3d& point : report.path) point = moved(point);
@@ -219,6 +225,8 @@ void take_truth(Placing& work, const PathMatch& match) {
   report.truth_median_m = match.median_m;
   report.truth_rms_m = match.rms_m;
   report.truth_covered = match.covered;
+  report.truth_late_s = match.late_s;
+  report.sigma_truth_late_s = match.sigma_late_s;
 }
 
 void set_scale(Placing& work, const TrueTrack& truth) {

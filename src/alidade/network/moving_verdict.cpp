@@ -154,6 +154,30 @@ void add_truth(const MovingTargetReport& report, Verdict& verdict) {
                                 " m (median) after a similarity, over " + text_of(100.0 * report.truth_covered) +
                                 " % of the path",
                             report.truth_median_m, 0.0, "m", ""});
+  constexpr double good_world = 0.03;  // σ over the cameras' distance: a receiver's, over a minute, is better
+  const double spread = spread_m(report);
+  const bool is_known = report.sigma_world_m < good_world * spread;
+  verdict.checks.push_back({"true path's frame", is_known ? State::good : State::care,
+                            "σ of a camera's position in the true path's frame " + text_of(report.sigma_world_m, 2) +
+                                " m" +
+                                (is_known ? ""
+                                          : ": a path that lies on itself when it is turned, as a circle, or a "
+                                            "true path with errors determines no more"),
+                            report.sigma_world_m, good_world * spread, "m", ""});
+}
+
+/// Where all clocks were taken as one.
+void add_truth_clock(const MovingTargetReport& report, Verdict& verdict) {
+  constexpr double limit = 4.2;
+  if (!(report.sigma_truth_late_s > 0.0)) return;
+  const double sigmas = std::abs(report.truth_late_s) / report.sigma_truth_late_s;
+  const bool is_one = sigmas < limit;
+  verdict.checks.push_back({"true path's clock", is_one ? State::good : State::care,
+                            is_one ? "the true path's times are the observations'"
+                                   : "the true path's times are " + text_of(std::abs(report.truth_late_s), 2) +
+                                         (report.truth_late_s > 0.0 ? " s late" : " s early") + ", by " +
+                                         text_of(sigmas, 2) + "σ: give --clocks SECONDS, which estimates its clock",
+                            sigmas, limit, "σ", ""});
 }
 
 }  // namespace
@@ -171,6 +195,7 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
   put_worst_first(report, verdict);  // what is wrong comes before what follows from it
   Verdict focals;
   add_focals(report, focals);
+  add_truth_clock(report, focals);
   verdict.checks.insert(verdict.checks.begin(), focals.checks.begin(), focals.checks.end());
   add_cameras(report, verdict);
   add_truth(report, verdict);
@@ -188,9 +213,11 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
     verdict.to_add = care->text;
   }
   const auto num = std::ranges::count(report.cameras, true, &LocatedCamera::placed);
+  const bool in_world = report.sigma_world_m > 0.0;
+  const double sigma_m = in_world ? report.sigma_world_m : report.sigma_relative_m;
+  const double sigma_rad = in_world ? report.sigma_world_rad : report.sigma_relative_rad;
   verdict.sentence = std::to_string(num) + " cameras located by a moving target, ± " +
-                     text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
-                     text_of(3.0 * report.sigma_relative_m, 2) + " m (3σ)";
+                     text_of(3.0 * sigma_rad / degree, 2) + "°, ± " + text_of(3.0 * sigma_m, 2) + " m (3σ)";
   heed_assumptions(report.assumed, verdict);
   return verdict;
 }

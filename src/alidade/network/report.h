@@ -91,10 +91,13 @@ struct MovingTargetReport {
   std::vector<Assumption> assumed;  ///< Lenses and the distance.
   std::vector<FocalScore> focals;   ///< One per located camera of which the observations determine it.
   double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
+  double sigma_world_m = 0.0, sigma_world_rad = 0.0;        ///< The same in the true path's frame; 0 without one.
   /// With a true path: its clock (time of the rig by its own), and the residuals of the similarity, over the path.
   CameraClock truth_clock;
   double truth_median_m = 0.0, truth_rms_m = 0.0;
   double truth_covered = 0.0;  ///< Share of the path that it covers.
+  /// By how much its times are late where clocks are not searched, and σ [s].
+  double truth_late_s = 0.0, sigma_truth_late_s = 0.0;
   int iterations = 0;
 };
 

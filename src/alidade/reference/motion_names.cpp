@@ -47,9 +47,9 @@ const NameTables& motion_names() {
   static const NameTables names{{"rig", R"(estimate:
 heads[].
   id                                 count  number
-  world_from_base.translation_m[3]   m      position of the head
+  world_from_base.translation_m[3]   m      position of the head; σ along the world's axes
   world_from_base.quaternion_wxyz[4] 1      rotation of the head
-  world_from_base.rotation_rad[3]    rad    under stddev: σ of the rotation
+  world_from_base.rotation_rad[3]    rad    under stddev: σ of the rotation, about the head's axes
   cam_from_tilt.rotation_rad[3]      rad    under stddev: σ of the rotation
   pan_to_tilt_m[3]                   m      from the pan axis to the tilt axis
   tilt_to_cam_m[3]                   m      from the tilt axis to the camera

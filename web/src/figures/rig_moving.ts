@@ -41,6 +41,7 @@ export const movingEstimate: Figure = {
     const cameras = camerasOf(doc);
     if (!cameras) return null;
     const indices = Array.from({length: 40}, (_, k) => k).filter((k) => Number.isFinite(doc.estimate(`cameras[${k}].id`)));
+    const isOneFixed = Array.from({length: cameras.rows}, (_, r) => covOf(cameras, r)[0]![0]!).some((variance) => variance === 0);
     const pair = (value: number, sigma: number, isHeld = sigma === 0) => { const text = valueText(value, sigma); return [el('td', {class: 'value'}, text.value), el('td', {}, text.plusMinus ? `± ${text.plusMinus}` : isHeld ? 'fixed' : '')]; };
     const body = el('tbody');
     for (const k of indices) {
@@ -58,7 +59,7 @@ export const movingEstimate: Figure = {
       if (e('sigma_clock_s') > 0 || Math.abs(e('clock_offset_s')) > 0) body.append(el('tr', {}, el('th', {}, 'clock'), ...pair(e('clock_offset_s'), e('sigma_clock_s')), el('td', {class: 'unit'}, 's')));
     }
     host.append(el('div', {class: 'scroll'}, el('table', {class: 'estimate'}, body)));
-    return {marks: indices.length, rows: indices.length, tables: [cameras], words: `${cameras.rows} cameras located`, good: 'Fixed: the σ of the others are relative to this camera. Clock: offset of the rig’s time from the camera’s own.'};
+    return {marks: indices.length, rows: indices.length, tables: [cameras], words: `${cameras.rows} cameras located`, good: `${isOneFixed ? 'Fixed: the σ of the others are relative to this camera. ' : ''}Clock: offset of the rig’s time from the camera’s own.`};
   },
 };
 

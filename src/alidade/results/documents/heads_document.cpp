@@ -28,11 +28,17 @@ JsonValue head_value(const Head& head) {
   return value;
 }
 
-/// σ by the names of a head; rotations as three small angles on the right.
-JsonValue head_sigma(int id, const HeadVector& sigma) {
+/// σ by the names of a head, from its part of a rig's covariance: of the position along the world's axes, as it is
+/// given; of rotations three small angles on the right.
+JsonValue head_sigma(const Rig& rig, const Eigen::MatrixXd& cov, std::size_t h) {
+  const Head& head = rig.heads[h].head;
+  const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
+  const HeadVector sigma = cov.diagonal().segment<num_head_params>(at).cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Matrix3d R = head.world_from_base.rotation.toRotationMatrix();
+  const Eigen::Matrix3d in_world = R * cov.block<3, 3>(at, at) * R.transpose();
   JsonValue value;
-  value["id"] = id;
-  value["world_from_base"]["translation_m"] = list_of(Eigen::Vector3d(sigma.head<3>()));
+  value["id"] = head.id;
+  value["world_from_base"]["translation_m"] = list_of(Eigen::Vector3d(in_world.diagonal().cwiseMax(0.0).cwiseSqrt()));
   value["world_from_base"]["rotation_rad"] = list_of(Eigen::Vector3d(sigma.segment<3>(base_rotation_param)));
   value["pan_to_tilt_m"] = list_of(Eigen::Vector3d(sigma.segment<3>(pan_to_tilt_param)));
   value["tilt_to_cam_m"] = list_of(Eigen::Vector3d(sigma.segment<3>(tilt_to_cam_param)));
@@ -52,11 +58,8 @@ JsonValue head_sigma(int id, const HeadVector& sigma) {
 void fill_heads(const Rig& rig, ResultDocument& document) {
   JsonValue heads = JsonValue::list(), sigmas = JsonValue::list();
   for (std::size_t h = 0; h < rig.heads.size(); ++h) {
-    const int id = rig.heads[h].head.id;
     heads.push_back(head_value(rig.heads[h].head));
-    const HeadVector variance =
-        rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
-    sigmas.push_back(head_sigma(id, variance.cwiseMax(0.0).cwiseSqrt()));
+    sigmas.push_back(head_sigma(rig, rig.cov, h));
   }
   document.covariance_names = parameter_names(rig);
   document.estimate["heads"] = std::move(heads);
@@ -67,11 +70,7 @@ void fill_heads(const Rig& rig, ResultDocument& document) {
 
 void fill_heads_model(const Rig& rig, const Eigen::MatrixXd& cov_model, ResultDocument& document) {
   JsonValue sigmas = JsonValue::list();
-  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
-    const HeadVector variance =
-        cov_model.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
-    sigmas.push_back(head_sigma(rig.heads[h].head.id, variance.cwiseMax(0.0).cwiseSqrt()));
-  }
+  for (std::size_t h = 0; h < rig.heads.size(); ++h) sigmas.push_back(head_sigma(rig, cov_model, h));
   document.stddev_model["heads"] = std::move(sigmas);
 }
 

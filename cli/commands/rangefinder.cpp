@@ -108,14 +108,13 @@ std::vector<SkippedInput> take_corners(const RangefinderArgs& args, std::vector<
 
 /// Corners that were not used are no shots: they are named, and do not count among those given.
 void add_not_used(std::span<const SkippedInput> corners, JobOutcome& outcome) {
-  constexpr std::size_t most_lines = 5;
   std::vector<SkippedInput>& skipped = outcome.document.counts.skipped;
   skipped.insert(skipped.end(), corners.begin(), corners.end());
+  std::vector<std::string> each;
+  for (const SkippedInput& one : corners)
+    each.push_back(one.file + (one.line > 0 ? ":" + std::to_string(one.line) : "") + ": " + one.reason);
   std::vector<std::string> lines;
-  for (const SkippedInput& one : corners.first(std::min(most_lines, corners.size())))
-    lines.push_back("not used: " + one.file + (one.line > 0 ? ":" + std::to_string(one.line) : "") + ": " + one.reason);
-  if (corners.size() > most_lines)
-    lines.push_back("not used: " + std::to_string(corners.size() - most_lines) + " more: see result.json");
+  add_each("not used", each, lines);
   outcome.lines.insert(outcome.lines.begin(), lines.begin(), lines.end());
 }
 

@@ -71,22 +71,32 @@ std::string image_or_none(const Make& make) {
   }
 }
 
-void summarize(const Calibration& calibration, std::vector<std::string>& lines) {
-  const std::vector<BoardView>& views = calibration.board_views;
-  const CalibrateReport& report = calibration;
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    if (!report.views[k].used) lines.push_back(fmt::format("not used: {}: {}", views[k].photo, report.views[k].reason));
-  }
-  if (report.status != CalibrateReport::Status::converged) return;
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
-      const CornerResidual& fit = report.views[k].corners[i];
+/// The corners that no noise explains, each with its photo.
+std::vector<std::string> rejected_corners(const Calibration& calibration) {
+  std::vector<std::string> rejected;
+  for (std::size_t k = 0; k < calibration.board_views.size(); ++k) {
+    const BoardView& view = calibration.board_views[k];
+    for (std::size_t i = 0; calibration.views[k].used && i < view.corners.size(); ++i) {
+      const CornerResidual& fit = calibration.views[k].corners[i];
       if (fit.used) continue;
       const std::string what = fit.residual_px.allFinite() ? fmt::format("is {:.2f} px off", fit.residual_px.norm())
                                                            : "lies where this lens sees nothing";
-      lines.push_back(fmt::format("rejected: {}: corner {} {}", views[k].photo, views[k].corners[i].index, what));
+      rejected.push_back(fmt::format("{}: corner {} {}", view.photo, view.corners[i].index, what));
     }
   }
+  return rejected;
+}
+
+void summarize(const Calibration& calibration, std::vector<std::string>& lines) {
+  const std::vector<BoardView>& views = calibration.board_views;
+  const CalibrateReport& report = calibration;
+  std::vector<std::string> not_used;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    if (!report.views[k].used) not_used.push_back(views[k].photo + ": " + report.views[k].reason);
+  }
+  add_each("not used", not_used, lines);
+  if (report.status != CalibrateReport::Status::converged) return;
+  add_each("rejected", rejected_corners(calibration), lines);
   const auto names = param_names(report.camera.lens);
   const Eigen::VectorXd values = params(report.camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -149,7 +159,10 @@ JobOutcome outcome_of(const FoundCorners& found) {
   document.data = std::move(whole.data);
   document.verdict = found.verdict;
   JsonValue photos = JsonValue::list();
-  for (const std::string& corner : found.rejected) outcome.lines.push_back("rejected: " + corner + " fits no noise");
+  std::vector<std::string> rejected;
+  for (const std::string& corner : found.rejected) rejected.push_back(corner + " fits no noise");
+  add_each("rejected", rejected, outcome.lines);
+  std::vector<std::string> no_corners;
   for (std::size_t k = 0; k < found.board_views.size(); ++k) {
     const BoardView& view = found.board_views[k];
     const std::string& reason = found.calibration.views[k].reason;
@@ -158,8 +171,9 @@ JobOutcome outcome_of(const FoundCorners& found) {
     row["corners"] = static_cast<int>(view.corners.size());
     row["reason"] = view.corners.empty() ? reason : "";
     photos.push_back(std::move(row));
-    if (view.corners.empty()) outcome.lines.push_back(fmt::format("no corners: {}: {}", view.photo, reason));
+    if (view.corners.empty()) no_corners.push_back(view.photo + ": " + reason);
   }
+  add_each("no corners", no_corners, outcome.lines);
   document.estimate["corners"] = static_cast<int>(found.num_corners);
   document.estimate["corners_left_out"] = static_cast<int>(found.num_rejected);
   document.estimate["sigma_px"] = found.sigma_px;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,9 @@ struct JobOutcome {
 
 /// These files of the outcome say, where its verdict is not good, that it is not.
 void note_verdict(std::initializer_list<std::string_view> files, JobOutcome& outcome);
+
+/// "KIND: WHAT", a line for each; of many the first ten, and how many more result.json names.
+void add_each(std::string_view kind, std::span<const std::string> each, std::vector<std::string>& lines);
 
 /// Rows of the job's file that were wrong and not read: counted as given, and named.
 inline void add_skipped(const std::vector<SkippedInput>& skipped, JobOutcome& outcome) {

@@ -268,20 +268,25 @@ void fill_document(const RangefinderCalibration& result, ResultDocument& documen
 
 /// What the photos did not give, and which shots were not used.
 std::vector<std::string> lines_of_shots(const RangefinderCalibration& result) {
-  std::vector<std::string> lines;
+  std::vector<std::string> no_boards;
+  std::vector<std::string> no_spots;
+  std::vector<std::string> not_used;
   for (std::size_t i = 0; i < result.measured.size(); ++i) {
     const Shot& shot = result.measured[i];
-    if (!shot.no_board.empty()) lines.push_back(fmt::format("no board: {}: {}", shot.photo, shot.no_board));
+    if (!shot.no_board.empty()) no_boards.push_back(shot.photo + ": " + shot.no_board);
     if (i >= result.photos.size()) continue;
     const ShotPhoto& photo = result.photos[i];
     const std::string& no_spot = photo.false_spot.empty() ? photo.no_spot : photo.false_spot;
-    if (!no_spot.empty()) lines.push_back(fmt::format("no spot: {}: {}", shot.photo, no_spot));
+    if (!no_spot.empty()) no_spots.push_back(shot.photo + ": " + no_spot);
   }
   for (std::size_t i = 0; i < result.shots.size() && i < result.measured.size(); ++i) {
     const ShotFit& fit = result.shots[i];
-    if (!fit.used && !fit.reason.empty())
-      lines.push_back(fmt::format("not used: {}: {}", result.measured[i].name, fit.reason));
+    if (!fit.used && !fit.reason.empty()) not_used.push_back(result.measured[i].name + ": " + fit.reason);
   }
+  std::vector<std::string> lines;
+  add_each("no board", no_boards, lines);
+  add_each("no spot", no_spots, lines);
+  add_each("not used", not_used, lines);
   if (!result.repeated.empty())
     lines.push_back(fmt::format("averaged: {} of {} shots are of the placement of the shot before",
                                 result.repeated.size(), result.counts.given));

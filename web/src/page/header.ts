@@ -14,12 +14,14 @@ function countsOf(doc: Doc): string[] {
   const parts: string[] = [], {used, given, dropped} = doc.counts;
   const word = doc.command === 'rig' && doc.table('cameras') ? 'observations' : doc.command === 'observe' && doc.table('photos') ? 'photos' : whatIsCounted[doc.command.split(' ')[0]!] ?? 'inputs';
   if (used !== undefined && !/^(plan|simulate|camera) /.test(doc.command)) parts.push(`${used}${given !== undefined && given > used ? ` of ${given}` : ''} ${(given ?? used) === 1 ? word.replace(/s$/, '') : word} used`);
+  const averaged = doc.skipped.filter((one) => one.reason.endsWith(': averaged with it')).length;
   const corners = doc.command === 'calibrate' ? doc.table('corners') : null;
   const rejected = corners ? corners.numbers('weight').filter((w) => w === 0).length : 0;
   if (corners && doc.isAnswer) parts.push(`${corners.thinned?.from ?? corners.rows} corners (${rejected} rejected)`);
   else if (corners) parts.push(`${corners.thinned?.from ?? corners.rows} corners`);
-  else if (dropped !== undefined && dropped > 0 && doc.command !== 'track') parts.push(`${dropped} rejected`);  // of a track some only waited for its start
-  if (doc.skipped.length > 0 && doc.command !== 'calibrate') parts.push(`${doc.skipped.length} skipped`);
+  else if (dropped !== undefined && dropped > averaged && doc.command !== 'track') parts.push(`${dropped - averaged} rejected`);  // of a track some only waited for its start
+  if (averaged > 0) parts.push(`${averaged} averaged with the one before`);
+  if (doc.skipped.length > averaged && doc.command !== 'calibrate') parts.push(`${doc.skipped.length - averaged} skipped`);
   if (Number.isFinite(doc.estimate('rms_px')))
     parts.push(`RMS ${num(doc.estimate('rms_px'), 3)} px${doc.command === 'calibrate' ? ' per corner' : ''}`);
   if (doc.estimate('rms_range_m') > 0) parts.push(`ranges ${num(1e3 * doc.estimate('rms_range_m'), 3)} mm`);

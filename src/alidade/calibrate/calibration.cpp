@@ -186,6 +186,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.study = study_calibration(board, result.board_views, result.config, result,
                                    max_informative(transfers, result.config.board_shape), progress);
   (errors.is_of_lens ? result.study.lens_error : result.study.print_error) = errors.text;
+  result.study.lens_remedy = errors.is_of_lens ? errors.remedy : "";
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);

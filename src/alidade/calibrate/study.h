@@ -58,7 +58,8 @@ struct CalibrationStudy {
   /// How the print departs from its grid, where that is proved and would move the lens by more than two of its σ; empty
   /// otherwise. With every point free it is estimated.
   std::string print_error;
-  std::string lens_error;  ///< Likewise of the lens, from its model.
+  std::string lens_error;   ///< Likewise of the lens, from its model.
+  std::string lens_remedy;  ///< What to do about it.
 };
 
 /// Residual structure, σ maps, halves and held-out error of other models; `transfer` is passed on. `report` must have

@@ -318,8 +318,7 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
   if (ails("board flat") && text_starts("board flat", "the print")) return "use --board-shape free";
   if (ails("lens adequate") && is_port) return "check the lens in air, --glass and --n-water, or take --model brown";
   if (!better_model.empty()) return better_model + ", which fits better on held-out photos";
-  if (!study.lens_error.empty())
-    return "no lens model here has this term: cover with boards all of the image that is used, and use no more of it";
+  if (!study.lens_error.empty()) return study.lens_remedy;
   if (ails("lens adequate"))
     return "no other lens model fits better: keep focus and zoom still, and look at the rings for where it departs";
   if (ails("coverage") && !next.photos.empty()) {

@@ -5,10 +5,12 @@
 #include <optional>
 #include <vector>
 
+#include "alidade/calibrate/checks/error_modes.h"
 #include "alidade/calibrate/checks/judge.h"
 #include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/calibrate/solve/columns.h"
 #include "alidade/calibrate/study.h"
+#include "alidade/estimation/innovation.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -21,58 +23,6 @@ using Eigen::VectorXd;
 constexpr std::size_t least_views_of_modes = 6;
 constexpr double included_sigmas = 3.0, proved_sigmas = 4.0;
 
-/// A departure from the grid, displacements of all points, or from the lens model, those of all image points.
-struct ErrorMode {
-  enum class Kind { lengths, angle, spacing, radial, prism_x, prism_y };
-  Kind kind = Kind::spacing;
-  MatrixXd displacement = {};  ///< Of the print: 2 × points [m], of size 1.
-  double largest_m = 0.0;      ///< Displacement of a point by size 1.
-
-  [[nodiscard]] bool is_of_lens() const { return kind >= Kind::radial; }
-};
-
-/// Displacement in the image plane at unit focal length of what is seen at `point_in_cam`, by size 1: the radial term
-/// that follows those of the model (pinhole k1, brown r⁹, kannala_brandt θ¹¹), or a thin prism, r².
-Eigen::Vector2d displacement_of(ErrorMode::Kind kind, const Lens& lens, const Eigen::Vector3d& point_in_cam) {
-  Eigen::Vector2d at = point_in_cam.head<2>() / point_in_cam.z();
-  double power = std::holds_alternative<Calibrated<Pinhole>>(lens) ? 2.0 : 8.0;
-  if (std::holds_alternative<Calibrated<KannalaBrandt>>(lens)) {
-    const double radius = point_in_cam.head<2>().norm();
-    at = point_in_cam.head<2>() / std::max(radius, 1e-12) * std::atan2(radius, point_in_cam.z());
-    power = 10.0;
-  }
-  if (kind == ErrorMode::Kind::prism_x) return {at.squaredNorm(), 0.0};
-  if (kind == ErrorMode::Kind::prism_y) return {0.0, at.squaredNorm()};
-  return at * std::pow(at.norm(), power);
-}
-
-/// In coordinates about the board's centre, 1 at the ends of its longer side.
-std::vector<ErrorMode> print_modes(std::span<const Eigen::Vector3d> points) {
-  const auto num = static_cast<Index>(points.size());
-  MatrixXd q(2, num);
-  for (Index i = 0; i < num; ++i) q.col(i) = points[static_cast<std::size_t>(i)].head<2>();
-  const Eigen::Vector2d low = q.rowwise().minCoeff(), high = q.rowwise().maxCoeff();
-  const double half = 0.5 * (high - low).maxCoeff();
-  q = (q.colwise() - 0.5 * (low + high)) / half;
-  const auto x = q.row(0).array(), y = q.row(1).array();
-  std::vector<ErrorMode> modes(8);
-  for (ErrorMode& mode : modes) mode.displacement = MatrixXd::Zero(2, num);
-  modes[0].kind = ErrorMode::Kind::lengths;
-  modes[0].displacement << 0.5 * x.matrix(), -0.5 * y.matrix();
-  modes[1].kind = ErrorMode::Kind::angle;
-  modes[1].displacement << 0.5 * y.matrix(), 0.5 * x.matrix();
-  for (Index row = 0; row < 2; ++row) {
-    modes[static_cast<std::size_t>(2 + row)].displacement.row(row) = x.square();
-    modes[static_cast<std::size_t>(4 + row)].displacement.row(row) = x * y;
-    modes[static_cast<std::size_t>(6 + row)].displacement.row(row) = y.square();
-  }
-  for (ErrorMode& mode : modes) {
-    mode.displacement *= half;
-    mode.largest_m = mode.displacement.colwise().norm().maxCoeff();
-  }
-  return modes;
-}
-
 /// Information and gradient of free lens parameters and modes, pose eliminated.
 struct ModeScore {
   MatrixXd information;
@@ -84,20 +34,25 @@ struct ModeView {
   const ViewArrays& corners;
   const Rigid3& cam_from_board;
   const std::vector<Eigen::Vector3d>& board_points;
-  const Lens& lens;
+  const Camera& camera;
 };
 
 /// Derivative of the view's pixels by the size of a mode, where that by a point of the board is the pose's translation.
 VectorXd column_of(const ErrorMode& mode, const ModeView& view, const Eigen::Ref<const MatrixXd>& by_point) {
   const Index half = by_point.rows() / 2;
-  const VectorXd focal = params(view.lens).head<2>();
+  const VectorXd focal = params(view.camera.lens).head<2>();
   VectorXd column = VectorXd::Zero(by_point.rows());
   for (std::size_t i = 0; i < view.corners.size(); ++i) {
     const auto u = static_cast<Index>(i), v = half + u;
     const auto point = view.corners.index[i];
-    if (mode.is_of_lens()) {
-      const Eigen::Vector3d in_cam = view.cam_from_board * view.board_points[static_cast<std::size_t>(point)];
-      const Eigen::Vector2d by = displacement_of(mode.kind, view.lens, in_cam);
+    const Eigen::Vector3d in_cam = view.cam_from_board * view.board_points[static_cast<std::size_t>(point)];
+    if (mode.is_of_rays()) {
+      const double row = view.corners.v_px[i] / view.camera.height_px - 0.5;
+      const Eigen::Vector3d by = view.cam_from_board.rotation.conjugate() * displacement_in_cam(mode.kind, in_cam, row);
+      column[u] = by_point.row(u).head<3>().dot(by);
+      column[v] = by_point.row(v).head<3>().dot(by);
+    } else if (mode.is_of_lens()) {
+      const Eigen::Vector2d by = displacement_of(mode.kind, view.camera.lens, in_cam);
       column[u] = focal[0] * by.x();
       column[v] = focal[1] * by.y();
     } else {
@@ -135,7 +90,7 @@ std::vector<ModeScore> mode_scores_of(std::span<const BoardView> used, const Cal
   for (const ViewFit& fit : report.views) {
     if (!fit.used) continue;
     const ViewArrays corners = make_arrays(used[k++]);
-    const ModeView view{corners, fit.cam_from_board, report.board_points, report.camera.lens};
+    const ModeView view{corners, fit.cam_from_board, report.board_points, report.camera};
     const auto score = mode_score_of(view, lens, points, free, modes);
     if (!score) return {};
     scores.push_back(*score);
@@ -217,29 +172,6 @@ bool is_beyond(const ModeEstimate& one, double sigmas, std::size_t num_views) {
          std::abs(one.size) > student(sigmas, static_cast<double>(num_views) - 2.0) * one.by_scatter;
 }
 
-std::string mode_sentence(const ErrorMode& mode, const ModeEstimate& one) {
-  const auto sized = [](double unit, double value) { return text_of(unit * std::abs(value), 2); };
-  const double error = 3.0 * one.sigma();
-  const std::string sigmas = " (" + text_of(std::abs(one.size) / one.sigma(), 2) + "σ)";
-  switch (mode.kind) {
-    case ErrorMode::Kind::lengths:
-      return std::string("the print is ") + sized(100.0, one.size) + " ± " + sized(100.0, error) + " % too long " +
-             (one.size > 0.0 ? "along its rows" : "along its columns") + ", against its other side";
-    case ErrorMode::Kind::angle:
-      return "the print's rows and columns are " + sized(1e3, one.size) + " ± " + sized(1e3, error) +
-             " mrad off a right angle";
-    case ErrorMode::Kind::spacing:
-      return "the print's spacing is uneven, by up to " + sized(1e3 * mode.largest_m, one.size) + " ± " +
-             sized(1e3 * mode.largest_m, error) + " mm";
-    case ErrorMode::Kind::radial:
-      return "the lens has radial distortion of a higher order than its model" + sigmas;
-    case ErrorMode::Kind::prism_x:
-    case ErrorMode::Kind::prism_y:
-      return "the lens has thin-prism distortion, which its model has not" + sigmas;
-  }
-  return "";
-}
-
 /// The ratio of the print's lengths is hardly ever known to better than this, and photos of an upright board hardly
 /// separate it from fx / fy.
 constexpr double ordinary_lengths = 2e-3;
@@ -260,6 +192,92 @@ VectorXd count_modes(const ReducedModes& all, const std::vector<Index>& found, d
   return moved;
 }
 
+/// Which modes the photos show, and the one to name.
+class ModeFindings {
+ public:
+  ModeFindings(const ReducedModes& all, const std::vector<ErrorMode>& modes, double noise_px, std::size_t num_views,
+               ModelErrors& errors)
+      : all_(all), modes_(modes), noise_px_(noise_px), num_views_(num_views), errors_(errors) {
+    for (Index m = 0; m < std::ssize(modes); ++m) estimates_.push_back(mode_estimate_of(all, m, noise_px));
+  }
+
+  /// A mode by itself; whether it is included.
+  bool take(Index m) {
+    const ModeEstimate& one = estimates_[static_cast<std::size_t>(m)];
+    if (!is_determined(m) || !is_beyond(one, included_sigmas, num_views_)) return false;
+    include(m, std::abs(one.size) / one.sigma(), is_beyond(one, proved_sigmas, num_views_));
+    return true;
+  }
+
+  /// Modes of one cause, each of which the others hide: by their χ² and by Hotelling's T² of the photos.
+  void take_together(ErrorMode::Kind first, ErrorMode::Kind last) {
+    std::vector<Index> group;
+    for (Index m = 0; m < std::ssize(modes_); ++m) {
+      const ErrorMode::Kind kind = modes_[static_cast<std::size_t>(m)].kind;
+      if (kind >= first && kind <= last && is_determined(m)) group.push_back(m);
+    }
+    const double sigmas = group.empty() ? 0.0 : sigmas_together(group);
+    if (sigmas < included_sigmas) return;
+    std::ranges::sort(group, std::ranges::greater{}, [&](Index m) { return sigmas_alone(m); });
+    for (const Index m : group) include(m, m == group.front() ? sigmas : 0.0, sigmas > proved_sigmas);
+  }
+
+  [[nodiscard]] double sigma(Index m) const { return estimates_[static_cast<std::size_t>(m)].sigma(); }
+  [[nodiscard]] const std::vector<Index>& found() const { return found_; }
+  [[nodiscard]] double variance() const { return variance_; }
+
+ private:
+  /// Not what lens and poses do.
+  [[nodiscard]] bool is_determined(Index m) const {
+    constexpr double nothing_left = 1e-9;  // of it
+    return all_.information(m, m) > nothing_left * all_.alone[m];
+  }
+  [[nodiscard]] double sigmas_alone(Index m) const {
+    return std::abs(estimates_[static_cast<std::size_t>(m)].size) / sigma(m);
+  }
+
+  [[nodiscard]] double sigmas_together(const std::vector<Index>& group) const {
+    const MatrixXd information = all_.information(group, group), follows = all_.follows(Eigen::all, group);
+    const VectorXd score = all_.score(group), size = -Ldlt(information).solve(score);
+    VectorXd step = VectorXd::Zero(all_.num_free + all_.score.size());
+    step.head(all_.num_free) = follows * size;
+    for (std::size_t i = 0; i < group.size(); ++i) step[all_.num_free + group[i]] = size[static_cast<Index>(i)];
+    MatrixXd scatter = 0.0 * information;
+    for (const ModeScore& view : all_.of_view) {
+      const VectorXd gradient = view.gradient + view.information * step;
+      const VectorXd own =
+          VectorXd(gradient.tail(all_.score.size()))(group) + follows.transpose() * gradient.head(all_.num_free);
+      scatter += own * own.transpose();
+    }
+    const auto num = static_cast<double>(group.size()), n = static_cast<double>(num_views_);
+    const double by_noise = -score.dot(size) / (noise_px_ * noise_px_);
+    const double T2 = score.dot(Ldlt(scatter * n / (n - 1.0)).solve(score));
+    return std::min(score_sigmas(by_noise, num, 0.0), score_sigmas(n * T2 / (n - 1.0 + T2), num, n));
+  }
+
+  void include(Index m, double sigmas, bool is_proved) {
+    if (std::ranges::count(found_, m) == 0) found_.push_back(m);
+    variance_ = std::max(variance_, sigma(m) * sigma(m) * all_.information(m, m));
+    if (sigmas <= largest_) return;
+    const ErrorMode& mode = modes_[static_cast<std::size_t>(m)];
+    const ModeEstimate& one = estimates_[static_cast<std::size_t>(m)];
+    largest_ = sigmas;
+    errors_.text = sentence_of(mode, one.size, one.sigma());
+    errors_.is_of_lens = mode.is_of_lens();
+    errors_.remedy = remedy_of(mode);
+    errors_.is_proved = is_proved;
+  }
+
+  const ReducedModes& all_;
+  const std::vector<ErrorMode>& modes_;
+  double noise_px_;
+  std::size_t num_views_;
+  ModelErrors& errors_;
+  std::vector<ModeEstimate> estimates_;
+  std::vector<Index> found_;
+  double variance_ = 0.0, largest_ = 0.0;
+};
+
 }  // namespace
 
 ModelErrors model_errors(std::span<const BoardView> views, const CalibrateReport& report) {
@@ -268,39 +286,26 @@ ModelErrors model_errors(std::span<const BoardView> views, const CalibrateReport
   const std::vector<Index> free = split_of(report).free;
   const std::vector<BoardView> used = used_views(views, report, views.size());
   if (!is_central(report.camera.lens) || free.empty() || used.size() < least_views_of_modes) return errors;
-  std::vector<ErrorMode> modes = print_modes(report.board_points);
-  for (const auto kind : {ErrorMode::Kind::radial, ErrorMode::Kind::prism_x, ErrorMode::Kind::prism_y})
-    modes.push_back({.kind = kind});
+  const std::vector<ErrorMode> modes = error_modes(report.board_points);
   std::vector<ModeScore> scores = mode_scores_of(used, report, free, modes);
   const std::optional<ReducedModes> all =
       scores.empty() ? std::nullopt : reduced_modes(std::move(scores), std::ssize(free));
   if (!all) return errors;
 
   const MatrixXd stated = report.camera.cov(free, free);
+  ModeFindings findings(*all, modes, report.noise_px, used.size(), errors);
   MatrixXd cov = MatrixXd::Zero(std::ssize(free), std::ssize(free));
-  std::vector<Index> found;
-  double largest = 0.0, variance = 0.0;
   for (Index m = 0; m < std::ssize(modes); ++m) {
-    constexpr double nothing_left = 1e-9;  // of it: the mode is what lens and poses do
-    if (!(all->information(m, m) > nothing_left * all->alone[m])) continue;
-    const ErrorMode& mode = modes[static_cast<std::size_t>(m)];
-    const ModeEstimate one = mode_estimate_of(*all, m, report.noise_px);
-    if (is_beyond(one, included_sigmas, used.size())) {
-      found.push_back(m);
-      variance = std::max(variance, one.sigma() * one.sigma() * all->information(m, m));
-      const double sigmas = std::abs(one.size) / one.sigma();
-      if (sigmas <= largest) continue;
-      largest = sigmas;
-      errors.text = mode_sentence(mode, one);
-      errors.is_of_lens = mode.is_of_lens();
-      errors.is_proved = is_beyond(one, proved_sigmas, used.size());
-    } else if (mode.kind == ErrorMode::Kind::lengths) {
-      const double sigma2 = 1.0 / (1.0 / (one.sigma() * one.sigma()) + 1.0 / (ordinary_lengths * ordinary_lengths));
-      const VectorXd by = std::sqrt(sigma2) * all->follows.col(m);
-      if (sigmas_of(by, stated) > 1.0) cov += by * by.transpose();
-    }
+    if (findings.take(m) || modes[static_cast<std::size_t>(m)].kind != ErrorMode::Kind::lengths) continue;
+    const double sigma = findings.sigma(m);
+    const double sigma2 = 1.0 / (1.0 / (sigma * sigma) + 1.0 / (ordinary_lengths * ordinary_lengths));
+    const VectorXd by = std::sqrt(sigma2) * all->follows.col(m);
+    if (sigmas_of(by, stated) > 1.0) cov += by * by.transpose();
   }
-  if (!found.empty()) errors.moves = sigmas_of(count_modes(*all, found, variance, cov), stated);
+  findings.take_together(ErrorMode::Kind::pupil, ErrorMode::Kind::plate_y);
+  findings.take_together(ErrorMode::Kind::motion_x, ErrorMode::Kind::motion_z);
+  if (!findings.found().empty())
+    errors.moves = sigmas_of(count_modes(*all, findings.found(), findings.variance(), cov), stated);
   errors.cov(free, free) = cov;
   return errors;
 }

@@ -9,14 +9,16 @@
 namespace alidade {
 
 /// How a board's print departs from its grid (longer along than across, rows not perpendicular to columns, a spacing
-/// that changes over the print, quadratic: printers do all of this by a few hundredths of a percent), and a lens from
-/// its model (the next radial term, thin prism).
+/// that changes over the print, quadratic: printers do all of this by a few hundredths of a percent), a lens from its
+/// model (the next radial term, thin prism), rays from one point (an entrance pupil that moves with the angle, a tilted
+/// plate), and photos from an instant (a rolling shutter, and the same motion in all of them).
 struct ModelErrors {
   std::string text;         ///< The largest, with its size; empty where none is significant.
-  bool is_of_lens = false;  ///< The largest is an error of the lens, not of the print.
-  bool is_proved = false;   ///< The largest, from 4σ: one clean set in 1500 has such.
+  std::string remedy;       ///< What to do where it is of the lens.
+  bool is_of_lens = false;  ///< The largest is an error of the lens or of its rays, not of the print.
+  bool is_proved = false;   ///< The largest, from 4σ: one clean set in 800 has such.
   double moves = 0.0;       ///< Of the lens by what is significant, in its stated σ along the direction moved.
-  /// For the covariance of the lens: what is significant (from 3σ: one clean set in 30) moves it by, and the ratio of
+  /// For the covariance of the lens: what is significant (from 3σ: one clean set in 20) moves it by, and the ratio of
   /// the print's lengths where the photos separate it from fx / fy by less than the stated σ.
   Eigen::MatrixXd cov;
 };

@@ -92,11 +92,14 @@ std::string early_option(const CLI::App& app, const CLI::App& at) {
   return parsed.empty() ? "" : early_option(*parsed.front(), at);
 }
 
-/// "'--size' needs a value: WxH": an option that the line ends with, or that another follows.
+/// "'--size' needs a value: WxH": an option that the line ends with, or that another follows. "'--size' is given more
+/// than once".
 std::string missing_value(const CLI::App& at, const CLI::ParseError& error) {
   const std::string what = error.what(), name = what.substr(0, what.find(':'));
   const CLI::Option* option = at.get_option_no_throw(name);
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr || option == nullptr) return "";
+  const auto most = static_cast<std::size_t>(option->get_items_expected_max());
+  if (option->results().size() > most) return "'" + name + "' is given more than once";
   const int count = option->get_items_expected_min();
   const std::string type = option->get_type_name();
   return "'" + name + "' needs " + (count == 1 ? "a value" : std::to_string(count) + " values") + ": " +

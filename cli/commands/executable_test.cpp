@@ -139,6 +139,8 @@ TEST(Executable, AnOptionWithoutItsValueSaysWhatItTakes) {
             "alidade: error: observe: '--size' needs a value: WxH\n");
   EXPECT_EQ(run_alidade({"simulate", "board", "--seed"}).err,
             "alidade: error: simulate board: '--seed' needs a value: N\n");
+  EXPECT_EQ(run_alidade({"simulate", "board", "--seed", "1", "--seed", "2"}).err,
+            "alidade: error: simulate board: '--seed' is given more than once\n");
 }
 
 TEST(Executable, AnOptionBeforeItsCommandIsNamedWithItsPosition) {

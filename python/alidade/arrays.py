@@ -39,10 +39,17 @@ def whole(value: Any, name: str) -> int:
     raise ValueError(f"{name}: a whole number is needed, not {shown(value)}")
 
 
+def unmasked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Of a masked array its numbers, NaN where they are masked; others as they are."""
+    if not isinstance(array, np.ma.MaskedArray):
+        return np.asarray(array)
+    return array.astype(np.float64).filled(np.nan) if array.dtype.kind in "iuf" and array.mask.any() else array.data
+
+
 def numbers(values: Any, name: str) -> Numbers:
-    """`values` as a C-contiguous float64 array; a copy only where it is none."""
+    """`values` as a C-contiguous float64 array; a copy only where it is none. What is masked is NaN."""
     try:
-        array = np.asarray(values)
+        array = unmasked(np.asanyarray(values))
     except ValueError:
         raise ValueError(f"{name}: rows of different lengths are no array") from None
     if array.dtype.kind not in "iuf":

@@ -68,10 +68,14 @@ class Camera:
         k3 must be 0), or k1…k4 of cv2.fisheye; size (width, height); covariance over
         `parameter_names`, or (9, 9) over fx fy cx cy k1 k2 p1 p2 k3 ((8, 8) of a fisheye: k1…k4), without skew, as OpenCV counts."""
         matrix = numbers(K, "K")
-        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-            raise ValueError(f"K: (3, 3) finite numbers are needed, but the shape is {matrix.shape}")
+        if matrix.shape != (3, 3):
+            raise ValueError(f"K: (3, 3) numbers are needed, but the shape is {matrix.shape}")
+        if not np.isfinite(matrix).all():
+            raise ValueError("K: a number is not finite")
         if matrix[1, 0] != 0.0 or matrix[2].tolist() != [0.0, 0.0, 1.0]:
-            raise ValueError("K: [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] is needed")
+            raise ValueError("K: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] is needed")
+        if matrix[0, 1] != 0.0:
+            raise ValueError(f"K: OpenCV's functions ignore a skew, K[0, 1] is {matrix[0, 1]:g}; Camera(…, skew=…) has one")
         width, height = image_size(size)
         coefficients = [] if dist is None else numbers(dist, "dist").ravel().tolist()
         if not all(math.isfinite(each) for each in coefficients):
@@ -79,18 +83,21 @@ class Camera:
         focal_centre = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]
         if not (focal_centre[0] > 0.0 and focal_centre[1] > 0.0):
             raise ValueError("K: the focal lengths K[0, 0] and K[1, 1] must be above zero")
-        core = _alidade.camera_from_opencv(focal_centre, matrix[0, 1], coefficients, fisheye, width, height)
+        core = _alidade.camera_from_opencv(focal_centre, coefficients, fisheye, width, height)
         if covariance is None:
             return cls._of(core)
         square = _square(_in_our_order(covariance, core), len(core.names))
         return cls._of(_alidade.Camera(core.model, width, height, core.values, square, 0.0, ""))
 
     def to_opencv(self) -> tuple[Numbers, Numbers]:
-        """K (3, 3) and coefficients: k1 k2 p1 p2 k3, of a kannala_brandt lens k1…k4 of cv2.fisheye."""
+        """K (3, 3) and coefficients: k1 k2 p1 p2 k3, of a kannala_brandt lens k1…k4 of cv2.fisheye. A lens with skew is a
+        ValueError: OpenCV's functions ignore it."""
         if not self._core.is_central:
             raise ValueError(f"OpenCV has no {self.model} lens")
         fx, fy, cx, cy, skew = self._core.values[:5]
-        K = np.array([[fx, skew, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+        if skew != 0.0:
+            raise ValueError(f"OpenCV's functions ignore a skew, this lens has {skew:g} px")
+        K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
         return K, np.array(self._core.distortion or [0.0] * 5)
 
     @property

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import unmasked
+
 TUM = ["t_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"]
 
 
@@ -73,10 +75,21 @@ def is_table(value: Any) -> bool:
     return isinstance(value, abc.Mapping) or (hasattr(value, "columns") and hasattr(value, "iloc"))
 
 
+def _times(array: np.ndarray[Any, Any], are_ns: bool) -> list[str]:
+    """Dates or durations of any unit as seconds, or nanoseconds, to the last digit; NaT is an empty cell."""
+    ns = array.astype(f"{array.dtype.kind}8[ns]")
+    whole = [None if missing else int(each) for each, missing in zip(ns.astype(np.int64), np.isnat(ns))]
+    if are_ns:
+        return ["" if each is None else str(each) for each in whole]
+    return ["" if each is None else f"{'-' if each < 0 else ''}{abs(each) // 10**9}.{abs(each) % 10**9:09d}" for each in whole]
+
+
 def _cells(values: Any, name: str) -> list[str]:
-    array = np.asarray(values)
+    array = unmasked(np.asanyarray(values))
     if array.ndim != 1:
         raise ValueError(f"column '{name}': one number per row is needed, but the shape is {array.shape}")
+    if array.dtype.kind in "mM":
+        return _times(array, name.endswith("_ns"))
     if array.dtype.kind == "f":
         return ["" if each != each else repr(each) for each in array.tolist()]
     return ["" if each is None or str(each) in ("nan", "<NA>", "NaT") else str(each) for each in array.tolist()]

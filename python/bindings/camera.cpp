@@ -141,15 +141,12 @@ Camera camera_of(const std::string& model, int width_px, int height_px, const st
   return {width_px, height_px, with_params(lens, numbers), matrix_of(covariance), rms_px, std::move(source)};
 }
 
-Camera camera_of_opencv(const std::vector<double>& focal_centre, double skew, const std::vector<double>& coefficients,
+Camera camera_of_opencv(const std::vector<double>& focal_centre, const std::vector<double>& coefficients,
                         bool is_fisheye, int width_px, int height_px) {
   Camera camera = is_fisheye ? detail::fisheye_camera(focal_centre, coefficients, "from_opencv", "dist")
                              : detail::opencv_camera(focal_centre, coefficients, "from_opencv", "dist");
   camera.width_px = width_px;
   camera.height_px = height_px;
-  Eigen::VectorXd values = params(camera.lens);
-  values[4] = skew;
-  camera.lens = with_params(camera.lens, values);
   return camera;
 }
 

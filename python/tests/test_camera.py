@@ -187,6 +187,8 @@ class Values(unittest.TestCase):
                      lambda: al.Camera.from_opencv(K, DIST[:3], SIZE), lambda: al.Camera.from_opencv(K, DIST, (0, 1)),
                      lambda: al.Camera.from_opencv(K + [[0, 0, 0], [0, 0, 0], [1, 0, 0]], DIST, SIZE),
                      lambda: al.Camera.from_opencv(K + [[0, 0, 0], [1, 0, 0], [0, 0, 0]], DIST, SIZE),
+                     lambda: al.Camera.from_opencv(K + [[0, 5, 0], [0, 0, 0], [0, 0, 0]], DIST, SIZE),
+                     lambda: al.Camera("pinhole", SIZE, fx=1.0, fy=1.0, skew=5.0).to_opencv(),
                      lambda: al.Camera.from_opencv(K, DIST, SIZE, np.eye(3)), lambda: al.Camera.from_opencv(K, [1.0] * 8, SIZE)):
             with self.assertRaises(ValueError):
                 work()

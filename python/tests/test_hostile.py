@@ -33,6 +33,16 @@ class Hostile(InFolder):
         except (ValueError, TypeError, OverflowError) as error:
             self.assertNotIn("\n", str(error))
 
+    def test_what_is_masked_is_missing(self):
+        """It was used."""
+        corners = board_corners(num_views=6)
+        masked = np.ma.masked_array(corners, mask=np.zeros(corners.shape, bool))
+        missing = corners.copy()
+        masked[2, 5], missing[2, 5] = np.ma.masked, np.nan
+        masked.data[2, 5] = 1.0
+        parameters = [al.calibrate(corners=each, size=TRUE_CAMERA.size, board=BOARD).camera.parameters for each in (masked, missing)]
+        np.testing.assert_array_equal(*parameters)
+
     @fuzzed
     @given(ANYTHING)
     def test_boards_are_looked_for_in_anything(self, what):

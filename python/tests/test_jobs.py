@@ -37,6 +37,19 @@ class Jobs(InFolder):
         self.assertEqual(len(columns.tables["intrinsics"]), len(made.tables["log"]))
         self.assertAlmostEqual(result.camera.fx, result.estimate["camera"]["fx"], delta=1e-6)
 
+    def test_times_of_any_kind_are_the_same(self):
+        """datetime64[ns] was taken for seconds."""
+        made = al.simulate.rotation(seed=1)
+        table = made.tables["log"]
+        columns = {name: table[name] for name in table.dtype.names}
+        seconds = np.round(columns.pop("t") * 1e6).astype(np.int64)
+        since = np.datetime64("2026-01-01T00:00:00", "us").astype(np.int64)
+        expected = al.observe({"t": (seconds + since) * 1e-6, **columns}, size=(780, 582)).camera.parameters
+        for unit in ("us", "ns"):
+            times = (seconds + since).astype("datetime64[us]").astype(f"datetime64[{unit}]")
+            result = al.observe({"t": times, **columns}, size=(780, 582))
+            np.testing.assert_allclose(result.camera.parameters, expected, rtol=1e-6)
+
     def test_track(self):
         import pandas
         made = al.simulate.track(scenario="C", seed=2)

@@ -56,6 +56,29 @@ void write_temporary(const std::filesystem::path& file, const std::filesystem::p
   sync_file(file, named);
 }
 
+/// A device, a pipe or a socket, which takes bytes and is not replaced; `file` or what it links to.
+bool is_no_file(const std::filesystem::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+}
+
+void write_through(const std::filesystem::path& file, std::string_view content) {
+  const Descriptor out(::open(file.c_str(), O_WRONLY | O_CLOEXEC));
+  if (!out.is_open()) fail_on(file, "cannot be written", errno);
+  write_all(file, out, content);
+}
+
+void replace_file(const std::filesystem::path& file, std::string_view content) {
+  std::error_code error;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
+  if (error) fail_on(file, "cannot be written", error.value());
+  Temporary temporary(temporary_name(file));
+  write_temporary(file, temporary.path, content);
+  if (::rename(temporary.path.c_str(), file.c_str()) != 0) fail_on(file, "cannot be written", errno);
+  temporary.kept = true;
+  sync_all({file.has_parent_path() ? file.parent_path() : "."});
+}
+
 }  // namespace
 
 [[noreturn]] void fail_on(const std::filesystem::path& file, const char* what, int error) {
@@ -95,14 +118,12 @@ void write_file(const std::filesystem::path& file, std::string_view content) {
   if (file.filename().empty() || std::filesystem::is_directory(file, error)) {
     throw InputError(file.string() + ": is a folder, not a file");
   }
-  error.clear();
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
-  if (error) fail_on(file, "cannot be written", error.value());
-  Temporary temporary(temporary_name(file));
-  write_temporary(file, temporary.path, content);
-  if (::rename(temporary.path.c_str(), file.c_str()) != 0) fail_on(file, "cannot be written", errno);
-  temporary.kept = true;
-  sync_all({file.has_parent_path() ? file.parent_path() : "."});
+  if (is_no_file(file)) {
+    write_through(file, content);
+    return;
+  }
+  const bool is_link = std::filesystem::is_symlink(file, error);
+  replace_file(is_link ? std::filesystem::weakly_canonical(file, error) : file, content);
 }
 
 }  // namespace alidade

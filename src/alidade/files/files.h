@@ -19,7 +19,8 @@ struct InputError : std::runtime_error {
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
 
 /// Writes a file whole: temporary file in the same folder, then rename; makes missing folders. Nothing half-written
-/// ever stands under `file`. Throws InputError if it cannot be written.
+/// ever stands under `file`. A link stays, what it points to is replaced; devices and pipes are written to. Throws
+/// InputError if it cannot be written.
 void write_file(const std::filesystem::path& file, std::string_view content);
 
 ALIDADE_PUBLIC_END

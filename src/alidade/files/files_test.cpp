@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -56,6 +57,25 @@ TEST(Files, WritingMakesFoldersAndReplacesWhole) {
   write_file(file, "second");
   EXPECT_EQ(read_file(file), "second");
   EXPECT_EQ(num_entries(file.parent_path()), 1u) << "a temporary file was left";
+}
+
+// As root `camera convert … /dev/full` left a file there.
+TEST(Files, WhatIsNoFileIsWrittenToAndALinkStays) {
+  const TemporaryFolder folder;
+  const std::filesystem::path pipe = folder.path() / "pipe", link = folder.path() / "link";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::string got;
+  std::thread reader([&] { got = read_file(pipe); });
+  write_file(pipe, "through");
+  reader.join();
+  EXPECT_EQ(got, "through");
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  write_file(folder.path() / "target", "old");
+  std::filesystem::create_symlink("target", link);
+  write_file(link, "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(read_file(folder.path() / "target"), "new");
+  EXPECT_THAT(fault_of_writing("/dev/full"), HasSubstr("/dev/full: cannot be written"));
 }
 
 TEST(Files, AFileInTheCurrentFolderIsWrittenByItsBareName) {

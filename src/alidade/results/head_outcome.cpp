@@ -263,17 +263,19 @@ JobOutcome outcome_of(const HeadFollowing& following) {
   estimate["head_time_s"] = following.head_time_s;
   estimate["commands"] = following.num_commands;
   estimate["frames_skipped"] = following.num_skipped;
-  estimate["rms_px"] = following.rms_px;
-  estimate["max_px"] = following.max_px;
-  estimate["central_third"] = following.central_third;
+  const bool is_seen = following.max_px > 0.0;  // from a third of the time on
+  estimate["rms_px"] = is_seen ? JsonValue(following.rms_px) : JsonValue();
+  estimate["max_px"] = is_seen ? JsonValue(following.max_px) : JsonValue();
+  estimate["central_third"] = is_seen ? JsonValue(following.central_third) : JsonValue();
   fill_forecast(following, estimate);
   document.data.push_back(follow_table(following.frames));
   document.counts.used = static_cast<std::size_t>(std::ranges::count_if(following.frames, &FollowedFrame::is_found));
   document.counts.dropped = document.counts.given - document.counts.used;
   outcome.files = files_so_far(following);
-  outcome.lines.push_back(fmt::format("{} frames{}, {} commands; from a third of the time on {:.3g} px RMS",
-                                      following.frames.size(), skipped_text(following.num_skipped),
-                                      following.num_commands, following.rms_px));
+  outcome.lines.push_back(
+      fmt::format("{} frames{}, {} commands{}", following.frames.size(), skipped_text(following.num_skipped),
+                  following.num_commands,
+                  is_seen ? fmt::format("; from a third of the time on {:.3g} px RMS", following.rms_px) : ""));
   if (following.forecast)
     outcome.lines.push_back(fmt::format("servo predicts {:.3g} px RMS for this head, these delays and this target",
                                         following.forecast->rms_px));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "alidade/detect/video_log.h"
 #include "alidade/formats/camera_file.h"
@@ -17,8 +18,10 @@ namespace {
 
 void say_log(const ObserveReport& report, std::vector<std::string>& lines) {
   for (const ObservedQuantity& quantity : report.quantities) {
-    lines.push_back(fmt::format("{:<11} {:.6g} ± {:.2g}   (3σ; this log's bound {:.2g})", quantity.name, quantity.value,
-                                3.0 * quantity.sigma, 3.0 * quantity.bound));
+    const std::string bound =
+        std::isfinite(quantity.bound) ? fmt::format("; this log's bound {:.2g}", 3.0 * quantity.bound) : "";
+    lines.push_back(
+        fmt::format("{:<11} {:.6g} ± {:.2g}   (3σ{})", quantity.name, quantity.value, 3.0 * quantity.sigma, bound));
   }
   lines.push_back(fmt::format("σ of a pixel {:.3g} px, {}", report.sigma_px,
                               report.sigma_is_estimated ? "estimated from the residuals" : "as given"));

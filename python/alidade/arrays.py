@@ -39,11 +39,11 @@ def whole(value: Any, name: str) -> int:
     raise ValueError(f"{name}: a whole number is needed, not {shown(value)}")
 
 
-def unmasked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def unmasked(values: Any) -> npt.NDArray[Any]:
     """Of a masked array its numbers, NaN where they are masked; others as they are."""
-    if not isinstance(array, np.ma.MaskedArray):
-        return np.asarray(array)
-    return array.astype(np.float64).filled(np.nan) if array.dtype.kind in "iuf" and array.mask.any() else array.data
+    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "iuf" and np.ma.getmaskarray(values).any():
+        return np.where(np.ma.getmaskarray(values), np.nan, np.asarray(values.data, dtype=np.float64))
+    return np.asarray(values)
 
 
 def numbers(values: Any, name: str) -> Numbers:

@@ -21,6 +21,7 @@ struct RangefinderTrialSetup {
   RangefinderMethod method = RangefinderMethod::joint;
   int num_shots = 18;
   bool gives_lengths = false;  ///< The user takes the readings' scale and the squares for exact.
+  bool asks_scale = false;     ///< The user takes the squares for exact and estimates the readings' scale.
   bool has_boards = true;      ///< Else spots alone are left.
   bool is_mirrored = false;    ///< The images are, left to right.
 };
@@ -57,6 +58,10 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
   const Camera camera = mistaken_camera(sample.camera, setup.mistake.focal, setup.mistake.centre_px, setup.mistake.k1);
   RangefinderConfig given{.method = setup.method};
   if (setup.gives_lengths) given.sigma_scale = given.sigma_square_m = 0.0;
+  if (setup.asks_scale) {
+    given.estimate_scale = true;
+    given.sigma_square_m = 0.0;
+  }
   RangefinderTrial trial{solve_rangefinder(shots, sample.points, camera, given)};
   Verdict& verdict = trial.solved.verdict;
   const RangefinderReport& report = trial.solved.report;

@@ -26,7 +26,7 @@ const char* remedy_of(const RangefinderReport& report, const std::string& name) 
     return "measure the squares and give --sigma-square, or estimate the readings' scale: --scale";
   if (name == "scale") return "give --sigma-scale, or estimate it: --scale";
   if (name.starts_with("camera")) return "use a camera file with covariance: alidade calibrate";
-  if (name == "board.flat_m") return "glue the board to something flat";
+  if (name == "board.flat_m") return "glue the board to something flat, and let the spot fall on the print";
   return "leave the option away: it is estimated from the residuals";
 }
 

@@ -31,8 +31,8 @@ void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   if (z >= beyond_chance)
     check.text = "the readings are " + text_of(1.0 / report.beam.scale, 5) + " times what the board says (" +
                  text_of(z, 2) +
-                 "σ): the rangefinder's scale (then give --scale), the printed squares "
-                 "(measure them), or the camera's focal length";
+                 "σ): the printed squares (measure them), the camera's focal length, or the rangefinder's scale "
+                 "(where it is known to have one, give --scale): the shots cannot tell which";
   if (z >= ask_beyond && std::abs(away) > beyond_an_instrument) {
     const std::string unit = unit_of(report.beam.scale);
     check.state = State::refused;
@@ -46,12 +46,27 @@ void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   verdict.checks.push_back(std::move(check));
 }
 
+/// With --scale: one that squares of that length would give as well. More than this few rangefinders have.
+void add_asked_scale(const RangefinderReport& report, const RangefinderConfig& config, Verdict& verdict) {
+  constexpr double beyond_most = 0.015;
+  const double away = report.beam.scale - 1.0;
+  if (!config.estimate_scale || config.scale_by_need || !unit_of(report.beam.scale).empty()) return;
+  if (config.method == RangefinderMethod::spot || std::abs(away) < beyond_most) return;
+  verdict.checks.push_back(check_of("scale", State::care,
+                                    "the readings' scale is " + text_of(100.0 * std::abs(away), 3) +
+                                        " % off, more than most rangefinders': squares that are " +
+                                        text_of(100.0 * std::abs(away), 3) + " % " +
+                                        (away < 0.0 ? "longer" : "shorter") + " than given look the same: measure them",
+                                    std::abs(away), beyond_most, "", "residuals"));
+}
+
 void add_scale(const RangefinderReport& report, const RangefinderConfig& config, Verdict& verdict) {
   if (config.scale_by_need) add_found_scale(report, verdict);
   const std::string unit = config.estimate_scale && !config.scale_by_need ? unit_of(report.beam.scale) : "";
   if (!unit.empty())
     verdict.checks.push_back(check_of("scale", State::care, "the ranges are " + unit + ", not metres",
                                       report.beam.scale, 1.0, "", "residuals"));
+  add_asked_scale(report, config, verdict);
   constexpr double ask_beyond = 4.0;
   const double z = std::abs(report.scale_in_sigmas);
   if (z == 0.0) return;

@@ -102,6 +102,18 @@ TEST(ShotFaults, ExchangedColumnsOfSpotsAreNamed) {
   }
 }
 
+/// Squares that are 2 % longer than given look like a scale of the readings: following the advice to estimate one made
+/// it ●, 16σ off.
+TEST(ShotFaults, AScaleThatFewRangefindersHaveAsksForTheSquares) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    RangefinderTrialSetup longer{.square = 0.02, .asks_scale = true}, usual{.scale = 1.005, .asks_scale = true};
+    const Verdict verdict = rangefinder_trial(longer, seed).solved.verdict;
+    EXPECT_EQ(verdict.state, State::care) << seed;
+    EXPECT_NE(verdict.to_add.find("measure them"), std::string::npos) << verdict.to_add;
+    EXPECT_EQ(rangefinder_trial(usual, seed).solved.verdict.state, State::good) << seed;
+  }
+}
+
 /// Distortion that the file gives as exact is estimated with a σ that holds: the beam is the true one.
 TEST(ShotFaults, DistortionGivenWithoutSigmaIsEstimated) {
   RangefinderTrialSetup setup;

@@ -128,7 +128,8 @@ class FarWorld::Cube {
     const int v = std::min(static_cast<int>(place.v), num_texels() - 1);
     const std::vector<float>& tile = tiles_[tile_of(place.face, u, v)];
     if (tile.empty()) return 0.0f;  // not prepared
-    const float* texel = tile.data() + (v % tile_texels) * row_texels + u % tile_texels;
+    const float* texel =
+        tile.data() + (static_cast<unsigned>(v) % tile_texels) * row_texels + static_cast<unsigned>(u) % tile_texels;
     const float fu = place.u - static_cast<float>(u), fv = place.v - static_cast<float>(v);
     return (1.0f - fv) * ((1.0f - fu) * texel[0] + fu * texel[1]) +
            fv * ((1.0f - fu) * texel[row_texels] + fu * texel[row_texels + 1]);
@@ -145,15 +146,22 @@ class FarWorld::Cube {
   [[nodiscard]] int num_texels() const { return tiles_a_side_ * tile_texels; }
 
   [[nodiscard]] Place place_of(const Eigen::Vector3f& d) const {
-    int axis = 0;
-    d.cwiseAbs().maxCoeff(&axis);
-    const float depth = std::abs(d[axis]);
-    const auto texels = [&](int other) { return std::max(0.0f, (d[other % 3] / depth + 1.0f) * texels_per_unit_); };
-    return {2 * axis + (d[axis] < 0.0f), texels(axis + 1), texels(axis + 2)};
+    const Eigen::Vector3f size = d.cwiseAbs();
+    if (size.x() >= size.y() && size.x() >= size.z()) return on_face(0, d.x(), d.y(), d.z());
+    return size.y() >= size.z() ? on_face(1, d.y(), d.z(), d.x()) : on_face(2, d.z(), d.x(), d.y());
+  }
+
+  /// By a direction's part along that axis, and those along the next two.
+  [[nodiscard]] Place on_face(int axis, float along, float across_u, float across_v) const {
+    const float depth = std::abs(along);
+    const auto texels = [&](float across) { return std::max(0.0f, (across / depth + 1.0f) * texels_per_unit_); };
+    return {2 * axis + (along < 0.0f), texels(across_u), texels(across_v)};
   }
 
   [[nodiscard]] std::size_t tile_of(int face, int u, int v) const {
-    return static_cast<std::size_t>((face * tiles_a_side_ + v / tile_texels) * tiles_a_side_ + u / tile_texels);
+    const auto side = static_cast<unsigned>(tiles_a_side_);
+    return (static_cast<unsigned>(face) * side + static_cast<unsigned>(v) / tile_texels) * side +
+           static_cast<unsigned>(u) / tile_texels;
   }
 
   void add(const Place& place, int reach, std::set<std::size_t>& missing) const {

@@ -107,6 +107,7 @@ class LocalizationFilter {
   struct Measured {
     std::size_t observation = 0;
     const Feature* feature = nullptr;
+    Eigen::Matrix<double, 6, 3> J_before = Eigen::Matrix<double, 6, 3>::Zero();  ///< J_before_rotation() of it.
     Eigen::Vector2d px = Eigen::Vector2d::Zero();
     double variance_px2 = 0.0;
     Eigen::Vector2d nu = Eigen::Vector2d::Zero();  ///< Innovation at the last linearisation,
@@ -139,8 +140,8 @@ class LocalizationFilter {
   /// Derivatives and innovation at nominal ⊞ delta_. False where it is not seen.
   bool linearise(Measured& measured);
   struct Moved;
-  [[nodiscard]] Moved moved_by_delta(const Feature& nominal, const WorldRotation& turn);
-  [[nodiscard]] Eigen::Matrix<double, 2, 3> J_px_rotation(const ExpectedView& view, const Feature& nominal,
+  [[nodiscard]] Moved moved_by_delta(const Measured& measured, const WorldRotation& turn);
+  [[nodiscard]] Eigen::Matrix<double, 2, 3> J_px_rotation(const ExpectedView& view, const Measured& measured,
                                                           const Moved& moved, const WorldRotation& turn) const;
   void put_columns(const ExpectedView& view, const Eigen::Matrix<double, 2, 3>& J_rotation, const Moved& moved,
                    Measured& measured) const;

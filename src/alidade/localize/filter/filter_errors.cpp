@@ -21,12 +21,13 @@ struct LocalizationFilter::Moved {
 };
 
 /// The camera's lens moves in `camera_at_delta_`.
-LocalizationFilter::Moved LocalizationFilter::moved_by_delta(const Feature& nominal, const WorldRotation& turn) {
+LocalizationFilter::Moved LocalizationFilter::moved_by_delta(const Measured& measured, const WorldRotation& turn) {
+  const Feature& nominal = *measured.feature;
   Moved moved{motion_.world_from_cam, nominal};
   auto& [world_from_cam, feature] = moved;
   if (turns_world_) {  // the camera keeps its attitude: nothing measured depends on how the world is rotated
     world_from_cam.translation = turn.position_before(world_from_cam.translation, delta_.head<3>());
-    feature = turn.feature_before(nominal, error_of(nominal));
+    feature = turn.feature_before(nominal, error_of(nominal), measured.J_before);
   } else {
     world_from_cam.translation += delta_.head<3>();
     world_from_cam.rotation = (world_from_cam.rotation * exp_so3(delta_.segment<3>(3))).normalized();
@@ -43,18 +44,17 @@ LocalizationFilter::Moved LocalizationFilter::moved_by_delta(const Feature& nomi
   return moved;
 }
 
-Eigen::Matrix<double, 2, 3> LocalizationFilter::J_px_rotation(const ExpectedView& view, const Feature& nominal,
+Eigen::Matrix<double, 2, 3> LocalizationFilter::J_px_rotation(const ExpectedView& view, const Measured& measured,
                                                               const Moved& moved, const WorldRotation& turn) const {
   const Eigen::Matrix3d p_cross = cross_matrix(motion_.world_from_cam.translation);
   if (turns_world_)
-    return (view.J_px_pose.leftCols<3>() * p_cross + view.J_px_feature * J_before_rotation(nominal)) *
-           turn.world_from_cam();
+    return (view.J_px_pose.leftCols<3>() * p_cross + view.J_px_feature * measured.J_before) * turn.world_from_cam();
   const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(3));
   Eigen::Matrix<double, 2, 3> J_rotation = view.J_px_pose.rightCols<3>() * J;
   if (config_.holds_frame) {  // by errors counted from where the update began
     const Eigen::Matrix3d R = turn.world_from_cam(), RJ = R * J.transpose();
     J_rotation += view.J_px_pose.leftCols<3>() * (p_cross * R - cross_matrix(moved.world_from_cam.translation) * RJ);
-    J_rotation += view.J_px_feature * (J_before_rotation(nominal) * R - J_before_rotation(moved.feature) * RJ);
+    J_rotation += view.J_px_feature * (measured.J_before * R - J_before_rotation(moved.feature) * RJ);
   }
   return J_rotation;
 }
@@ -87,13 +87,12 @@ void LocalizationFilter::put_columns(const ExpectedView& view, const Eigen::Matr
 }
 
 bool LocalizationFilter::linearise(Measured& measured) {
-  const Feature& nominal = *measured.feature;
   const WorldRotation turn(motion_.world_from_cam, delta_.segment<3>(3));
-  const Moved moved = moved_by_delta(nominal, turn);
+  const Moved moved = moved_by_delta(measured, turn);
   const auto view = expected_view(num_lens() ? camera_at_delta_ : camera_, moved.world_from_cam, moved.feature);
   if (!view) return false;
   measured.nu = measured.px - view->px;
-  put_columns(*view, J_px_rotation(*view, nominal, moved, turn), moved, measured);
+  put_columns(*view, J_px_rotation(*view, measured, moved, turn), moved, measured);
   measured.c = measured.nu;
   for (std::size_t k = 0; k < static_cast<std::size_t>(measured.num_support); ++k)
     measured.c += delta_[measured.columns[k]] * Eigen::Vector2d(measured.h0[k], measured.h1[k]);
@@ -118,7 +117,8 @@ void LocalizationFilter::turn_by_delta() {
   block(3) = block(9) = Eigen::Matrix3d::Identity();
   for (const Feature& feature : features_) {
     block(feature.offset) = G;
-    if (feature.dim() > 3) block(feature.offset + 3) = turn.J_rotated_angles(feature, error_of(feature));
+    if (feature.dim() > 3)
+      block(feature.offset + 3) = WorldRotation::J_rotated_angles(G, turn.feature_before(feature, error_of(feature)));
   }
   P_.turn(shear_.data(), motion_dim, num_lens());
   given_.turn(shear_.data(), P_.capacity(), motion_dim, num_lens(), P_.dim());
@@ -131,13 +131,13 @@ void LocalizationFilter::turn_by_delta() {
   block(6) = added(was.velocity_in_world, motion_.velocity_in_world);
   for (Feature& feature : features_) {
     const Feature before = feature;
-    feature = WorldRotation::turned(G, turn.feature_before(before, error_of(before)));
+    const Eigen::Matrix<double, 6, 3> J_before = J_before_rotation(before);
+    feature = WorldRotation::turned(G, turn.feature_before(before, error_of(before), J_before));
     block(feature.offset) = added(before.values.head<3>(), feature.values.head<3>());
     if (feature.dim() < 6) continue;
+    const Eigen::Matrix3d J_rotated = block(feature.offset + 3);  // as it stands there
     block(feature.offset + 3) =
-        (turn.J_rotated_angles(before, error_of(before)) * J_before_rotation(before).bottomRows<3>() -
-         J_before_rotation(feature).bottomRows<3>() * J_left) *
-        R;
+        (J_rotated * J_before.bottomRows<3>() - J_before_rotation(feature).bottomRows<3>() * J_left) * R;
   }
   constexpr int rotation_at = 3;
   P_.shear(rotation_at, shear_.data());

@@ -5,6 +5,7 @@
 
 #include "alidade/estimation/iterated_update.h"
 #include "alidade/localize/filter/filter.h"
+#include "alidade/localize/filter/world_rotation.h"
 
 namespace alidade {
 namespace {
@@ -55,6 +56,7 @@ void LocalizationFilter::collect(std::span<const FeatureObservation> observation
     Measured measured;
     measured.observation = i;
     measured.feature = feature;
+    if (config_.holds_frame) measured.J_before = J_before_rotation(*feature);
     measured.px = observations[i].px;
     measured.variance_px2 = sigma_px * sigma_px;
     outcomes_[i] = ObservationOutcome::not_visible;

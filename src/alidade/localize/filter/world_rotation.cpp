@@ -21,18 +21,21 @@ WorldRotation::WorldRotation(const Rigid3& world_from_cam, const Eigen::Vector3d
 Eigen::Matrix3d WorldRotation::G() const { return exp_so3(xi_).toRotationMatrix(); }
 
 Feature WorldRotation::feature_before(const Feature& feature, std::span<const double> error) const {
+  return feature_before(feature, error, J_before_rotation(feature));
+}
+
+Feature WorldRotation::feature_before(const Feature& feature, std::span<const double> error,
+                                      const Eigen::Matrix<double, 6, 3>& J_before) const {
   Feature before = feature;
   before.values.head<3>() = position_before(feature.values.head<3>(), Eigen::Map<const Eigen::Vector3d>(error.data()));
   if (feature.kind == FeatureKind::xyz) return before;
   before.values.tail<3>() += Eigen::Map<const Eigen::Vector3d>(error.data() + 3);
-  before.values.segment<2>(3) -= J_angles_turn(bearing_of(feature.values[3], feature.values[4])) * xi_;
+  before.values.segment<2>(3) += J_before.middleRows<2>(3) * xi_;
   return before;
 }
 
-Eigen::Matrix3d WorldRotation::J_rotated_angles(const Feature& feature, std::span<const double> error) const {
-  const Feature before = feature_before(feature, error);
+Eigen::Matrix3d WorldRotation::J_rotated_angles(const Eigen::Matrix3d& G, const Feature& before) {
   const BearingAngles was = bearing_of(before.values[3], before.values[4]);
-  const Eigen::Matrix3d G = this->G();
   const AnglesOfBearing is = angles_of(G * was.m);
   Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
   J.block<2, 1>(0, 0) = is.J * G * was.m_theta;

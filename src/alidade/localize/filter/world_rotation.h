@@ -32,8 +32,11 @@ class WorldRotation {
   [[nodiscard]] Eigen::Vector3d position_before(const Eigen::Vector3d& place, const Eigen::Vector3d& error) const {
     return place + error + place.cross(xi_);
   }
-  /// A feature with its error (dim() components), before the world rotates.
+  /// A feature with its error (dim() components), before the world rotates; with its J_before_rotation(), where that is
+  /// at hand.
   [[nodiscard]] Feature feature_before(const Feature& feature, std::span<const double> error) const;
+  [[nodiscard]] Feature feature_before(const Feature& feature, std::span<const double> error,
+                                       const Eigen::Matrix<double, 6, 3>& J_before) const;
   [[nodiscard]] const Eigen::Matrix3d& world_from_cam() const { return world_from_cam_; }  ///< R̂.
   [[nodiscard]] const Eigen::Vector3d& xi() const { return xi_; }
 
@@ -41,7 +44,7 @@ class WorldRotation {
   /// A feature, as feature_before() gives it, rotated.
   [[nodiscard]] static Feature turned(const Eigen::Matrix3d& G, const Feature& before);
   /// Of an inverse depth: derivative of θ, φ, ρ after the rotation by those of feature_before().
-  [[nodiscard]] Eigen::Matrix3d J_rotated_angles(const Feature& feature, std::span<const double> error) const;
+  [[nodiscard]] static Eigen::Matrix3d J_rotated_angles(const Eigen::Matrix3d& G, const Feature& before);
 
  private:
   Eigen::Matrix3d world_from_cam_;

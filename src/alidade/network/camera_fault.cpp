@@ -46,14 +46,6 @@ Agreement agreement_of(const MovingTargetReport& report) {
   return agreement;
 }
 
-bool is_doubtful(const MovingTargetReport& report) {
-  constexpr double usual_rad = 0.2 * degree;
-  if (report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits) return false;
-  const bool all_located = std::ranges::all_of(report.cameras, &LocatedCamera::placed);
-  const bool is_solved = report.status == PlacedStatus::placed || report.status == PlacedStatus::no_scale;
-  return !is_solved || !all_located || report.sigma_relative_rad > usual_rad;
-}
-
 /// The central minute of the observations: enough to tell whether cameras agree.
 std::vector<TargetObservation> central_minute(std::span<const TargetObservation> observations) {
   constexpr double enough_s = 60.0;
@@ -161,6 +153,21 @@ void consider_clocks(const std::vector<TargetObservation>& observations, const s
 
 }  // namespace
 
+bool is_doubtful(const MovingTargetReport& report) {
+  constexpr double usual_rad = 0.2 * degree;
+  if (report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits) return false;
+  const bool all_located = std::ranges::all_of(report.cameras, &LocatedCamera::placed);
+  const bool is_solved = report.status == PlacedStatus::placed || report.status == PlacedStatus::no_scale;
+  return !is_solved || !all_located || report.sigma_relative_rad > usual_rad;
+}
+
+bool agrees_better(const MovingTargetReport& report, const MovingTargetReport& other) {
+  constexpr double plainly = 0.9;
+  const Agreement one = agreement_of(report), two = agreement_of(other);
+  if (one.num_placed != two.num_placed) return one.num_placed > two.num_placed;
+  return one.sigma_px < plainly * two.sigma_px;
+}
+
 std::string camera_fault_of(const MovingTargetReport& report, std::span<const TargetObservation> observations,
                             std::span<const RigHead> heads, double clock_search_s, const PlaceCameras& place) {
   const bool doubtful = is_doubtful(report);
@@ -180,7 +187,10 @@ std::string camera_fault_of(const MovingTargetReport& report, std::span<const Ta
   const double search_s = doubtful ? clock_search_s : 0.0;
   Agreement as_given = agreement_of(place(some, given, search_s));
   // A minute may not locate cameras that all observations do: what is exchanged is compared with the same.
-  if (const Agreement in_all = agreement_of(report); in_all.num_placed > as_given.num_placed) {
+  // Nor may the start that was best of all.
+  if (const Agreement in_all = agreement_of(report);
+      in_all.num_placed > as_given.num_placed ||
+      (in_all.num_placed == as_given.num_placed && in_all.sigma_px < 0.9 * as_given.sigma_px)) {
     some = all;
     as_given = in_all;
   }

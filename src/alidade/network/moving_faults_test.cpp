@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -112,6 +113,44 @@ TEST(MovingFaults, TheTruePathsOwnErrorsAreInEveryCamerasCovariance) {
   }
   EXPECT_GT(sum / num, 0.15);
   EXPECT_LT(sum / num, 1.6);
+}
+
+/// 12 m up and down, 40 m along, 1 m across, in 20 s.
+Eigen::Vector3d narrow(double t_s) {
+  const auto waves = [t_s](const Eigen::Vector3d& size, const Eigen::Vector3d& rate, const Eigen::Vector3d& phase) {
+    return size.dot(Eigen::Vector3d((rate.array() * t_s + phase.array()).sin()));
+  };
+  return {waves({4.990, 3.079, 4.219}, {0.1258, 0.2958, 0.2636}, {3.421, 1.176, 4.856}),
+          -15.0 - 0.5 * waves({3.586, 3.394, 7.914}, {0.4450, 0.2648, 0.4107}, {6.262, 1.990, 1.956}),
+          waves({7.732, 7.480, 5.369}, {0.4060, 0.1290, 0.2994}, {1.580, 3.805, 1.759})};
+}
+
+/// By the start of the first pair no path fit, and a clock was said to be 210 ms behind.
+TEST(MovingFaults, AShortPathIsBegunByAnotherPairWhereNoneFits) {
+  const std::array<Eigen::Vector3d, 3> places{Eigen::Vector3d(39.904, -1.019, 2.776),
+                                              Eigen::Vector3d(-21.522, -2.651, 33.716),
+                                              Eigen::Vector3d(-19.592, -3.905, -34.873)};
+  for (const unsigned seed : {2U, 3U}) {
+    MovingScene scene = testing::scene_of(testing::loops, seed, false);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise;
+    scene.observations.clear();
+    for (std::size_t c = 0; c < 3; ++c) {
+      scene.truth[c].head.world_from_base = testing::looking(places[c], {0.0, -15.0, 0.0});
+      for (double t_s = 0.01 * static_cast<double>(c); t_s < 20.0; t_s += 0.04) {
+        const auto seen = project(scene.truth[c], Eigen::Vector2d::Zero(), narrow(t_s));
+        if (!seen || random() % 10 == 0) continue;
+        const Eigen::Vector2d px = seen->px + Eigen::Vector2d(noise(random), noise(random));
+        if (px.x() < 0.0 || px.y() < 0.0 || px.x() > 1919.0 || px.y() > 1079.0) continue;
+        scene.observations.push_back({t_s, t_s, c, Eigen::Vector2d::Zero(), px, 0.0});
+      }
+    }
+    const MovingTargetConfig config{.distance = testing::true_distance(scene)};
+    const MovingTargetReport report = place_cameras(scene.observations, testing::unplaced(scene), config);
+    EXPECT_EQ(report.status, Placement::placed) << seed;
+    EXPECT_EQ(report.camera_fault, "") << seed;
+    EXPECT_LT(mean_square_of(report, scene), 4.0) << seed;
+  }
 }
 
 }  // namespace

@@ -195,7 +195,7 @@ std::optional<MovingStart> start_from(const ObservationPair& pair, std::span<con
 }  // namespace
 
 MovingStart start_cameras(std::span<const ObservationSeries> series, double search_s, double knot_s,
-                          const Progress& progress) {
+                          std::size_t num_better, const Progress& progress) {
   constexpr int max_starts = 4;
   MovingStart best;
   best.cameras.resize(series.size());
@@ -203,7 +203,7 @@ MovingStart start_cameras(std::span<const ObservationSeries> series, double sear
   std::vector<ObservationPair> by_strength = pairs;
   std::ranges::sort(by_strength, std::greater{}, start_strength);
   int num_starts = 0;
-  for (const ObservationPair& pair : by_strength) {
+  for (const ObservationPair& pair : std::span(by_strength).subspan(std::min(num_better, by_strength.size()))) {
     if (pair.share < min_share || num_starts == max_starts || num_placed(best) == series.size()) break;
     auto start = start_from(pair, series, pairs, search_s, knot_s, progress);
     if (!start) continue;

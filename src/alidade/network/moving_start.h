@@ -27,9 +27,10 @@ struct MovingStart {
 };
 
 /// Pairs of cameras by their epipolar geometry over all differences of their clocks, the best pair first; then camera
-/// after camera by the path so far. `knot_s`: step of the path. Throws Interrupted.
+/// after camera by the path so far. `knot_s`: step of the path; `num_better`: pairs before which it does not begin.
+/// Throws Interrupted.
 [[nodiscard]] MovingStart start_cameras(std::span<const ObservationSeries> series, double search_s, double knot_s,
-                                        const Progress& progress);
+                                        std::size_t num_better, const Progress& progress);
 
 /// Where the located cameras' rays meet, at a step of `knot_s`.
 void rebuild_path(std::span<const ObservationSeries> series, double knot_s, MovingStart& start);

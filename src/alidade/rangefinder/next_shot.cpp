@@ -1,49 +1,45 @@
 #include "alidade/rangefinder/next_shot.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
-#include "alidade/rangefinder/solve/beam_bound.h"
-#include "alidade/rangefinder/solve/refine_all.h"
+#include "alidade/rangefinder/solve/foreseen_beam.h"
 
 namespace alidade {
 namespace {
 
 constexpr int num_distances = 8, num_tilts = 4, num_sides = 8;
 
-/// What is known of [beam, free lens parameters], and what shots would add to it.
+/// What is known, and what shots would add to it.
 class Planner {
  public:
-  Planner(const BeamNow& now, const ShotLimits& limits) : now_(now), limits_(limits) {
-    problem_.points_in_board = now.points_in_board;
-    problem_.model.noise = now.beam.noise;
-    problem_.sigma_corner_px = now.sigma_corner_px;
-    problem_.estimate_scale = now.estimate_scale;
-    prior_ = lens_prior(now.camera, true);
-    information_ = known();
-    prior_.information.setZero();  // it is in what is known; a shot must not bring it again
+  Planner(const BeamNow& now, const ShotLimits& limits) : now_(now), limits_(limits), foreseen_(now) {
     for (const Eigen::Vector3d& point : now.points_in_board)
       centre_in_board_ += point / static_cast<double>(now.points_in_board.size());
   }
 
   struct Gain {
     NextShot shot;
+    Shot seen;  ///< As it would be measured.
     Eigen::MatrixXd information;
     double score = std::numeric_limits<double>::infinity();  ///< Mean variance of the points measured. [m²]
   };
 
+  /// None where the camera does not see the board whole.
   [[nodiscard]] std::optional<Gain> gain_of(double distance_m, double tilt_rad, double azimuth_rad) const {
     Gain gain;
-    gain.shot = {distance_m, tilt_rad, azimuth_rad, board_at(distance_m, tilt_rad, azimuth_rad), 0.0, 0.0, 0.0};
-    const auto added = information_of(gain.shot);
+    const Rigid3 cam_from_board = board_at(distance_m, tilt_rad, azimuth_rad);
+    gain.shot = {distance_m, tilt_rad, azimuth_rad, cam_from_board, 0.0, 0.0, 0.0};
+    gain.seen.range_m = distance_m;
+    gain.seen.board = foreseen_.board_at(cam_from_board);
+    if (!gain.seen.board) return std::nullopt;
+    auto added = foreseen_.information_of(distance_m, cam_from_board, *gain.seen.board, now_.sees_spots);
     if (!added) return std::nullopt;
-    gain.information = information_ + *added;
-    const Eigen::MatrixXd cov = inverse(gain.information);
+    const Eigen::MatrixXd cov = foreseen_.cov_with(*added);
     if (!cov.allFinite()) return std::nullopt;
+    gain.information = std::move(*added);
     gain.score = mean_variance(cov);
     return gain;
   }
@@ -73,20 +69,8 @@ class Planner {
 
   /// Takes the shot: what follows counts it.
   NextShot take(const Gain& gain) {
-    information_ = gain.information;
-    const Eigen::MatrixXd cov = inverse(information_);
-    Beam beam = now_.beam;
-    Camera camera = now_.camera;
-    const int p = problem_.num_free();
-    const auto k = static_cast<Eigen::Index>(prior_.free.size());
-    beam.cov.setZero();
-    beam.cov.topLeftCorner(p, p) = cov.topLeftCorner(p, p);
-    if (k > 0) {
-      camera.cov(prior_.free, prior_.free) = cov.bottomRightCorner(k, k);
-      beam.cov_with_lens.setZero(num_beam_params, prior_.mean.size());
-      beam.cov_with_lens(Eigen::seqN(0, p), prior_.free) = cov.topRightCorner(p, k);
-    }
-    const BeamBound bound = judge_beam(problem_, beam, camera);
+    foreseen_.add(gain.information);
+    const BeamBound bound = foreseen_.bound();
     NextShot shot = gain.shot;
     shot.sigma_origin_m = bound.sigma_origin_m;
     shot.sigma_direction_rad = bound.sigma_direction_rad;
@@ -95,31 +79,6 @@ class Planner {
   }
 
  private:
-  [[nodiscard]] static Eigen::MatrixXd inverse(const Eigen::MatrixXd& H) {
-    const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-    const Ldlt ldlt(scale.asDiagonal() * H * scale.asDiagonal());
-    return scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
-  }
-
-  /// Information of the covariances at hand; a beam that is not known at all is within half a metre and half a radian.
-  [[nodiscard]] Eigen::MatrixXd known() const {
-    const int p = problem_.num_free();
-    const auto k = static_cast<Eigen::Index>(prior_.free.size());
-    Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(p + k, p + k);
-    const bool knows_beam = now_.beam.cov.diagonal().head(p).minCoeff() > 0.0 && now_.beam.cov.allFinite();
-    if (knows_beam) {
-      cov.topLeftCorner(p, p) = now_.beam.cov.topLeftCorner(p, p);
-    } else {
-      cov.diagonal().head(p).setConstant(0.25);
-    }
-    if (k > 0) cov.bottomRightCorner(k, k) = now_.camera.cov(prior_.free, prior_.free);
-    if (k > 0 && knows_beam && now_.beam.cov_with_lens.cols() == prior_.mean.size()) {
-      cov.topRightCorner(p, k) = now_.beam.cov_with_lens(Eigen::seqN(0, p), prior_.free);
-      cov.bottomLeftCorner(k, p) = cov.topRightCorner(p, k).transpose();
-    }
-    return inverse(cov);
-  }
-
   /// The board's centre where the beam hits, its normal tilted so that the azimuth's side is farther.
   [[nodiscard]] Rigid3 board_at(double distance_m, double tilt_rad, double azimuth_rad) const {
     const Eigen::Vector3d axis(std::sin(azimuth_rad), -std::cos(azimuth_rad), 0.0);
@@ -127,49 +86,20 @@ class Planner {
     return {rotation, point_at(now_.beam, distance_m) - rotation * centre_in_board_};
   }
 
-  /// Of a shot measured exactly as predicted; none where the camera does not see the board whole.
-  [[nodiscard]] std::optional<Eigen::MatrixXd> information_of(const NextShot& next) const {
-    BoardView view;
-    for (std::size_t i = 0; i < now_.points_in_board.size(); ++i) {
-      const auto px = project(now_.camera, next.cam_from_board * now_.points_in_board[i]);
-      const bool is_inside = px && px->x() > 5.0 && px->y() > 5.0 && px->x() < now_.camera.width_px - 6.0 &&
-                             px->y() < now_.camera.height_px - 6.0;
-      if (!is_inside) return std::nullopt;
-      view.corners.push_back({static_cast<int>(i), *px});
-    }
-    PreparedShot shot;
-    shot.range_m = next.distance_m;
-    shot.sigma_spot_px = now_.sigma_spot_px;
-    if (now_.method != RangefinderMethod::plane) {
-      shot.spot_px = project(now_.camera, point_at(now_.beam, next.distance_m));
-      if (!shot.spot_px) return std::nullopt;
-    }
-    if (now_.method != RangefinderMethod::spot) shot.plane = plane_of(next.cam_from_board);
-    shot.board = &view;
-    BeamProblem one = problem_;
-    one.shots = {shot};
-    const auto system = common_system(one, prior_, {now_.beam, now_.camera, {next.cam_from_board}});
-    if (!system) return std::nullopt;
-    return system->information();
-  }
-
   /// Of points at the origin, the nearest, the mean and the farthest range.
   [[nodiscard]] double mean_variance(const Eigen::MatrixXd& cov) const {
-    const int p = problem_.num_free();
     const double mid_m = std::sqrt(limits_.min_range_m * limits_.max_range_m);
     double sum = 0.0;
     for (const double range_m : {0.0, limits_.min_range_m, mid_m, limits_.max_range_m}) {
-      const Eigen::MatrixXd J = J_point_beam(now_.beam, range_m).leftCols(p);
-      sum += 0.25 * (J * cov.topLeftCorner(p, p) * J.transpose()).trace();
+      const Eigen::MatrixXd J = J_point_beam(now_.beam, range_m).leftCols(cov.cols());
+      sum += 0.25 * (J * cov * J.transpose()).trace();
     }
     return sum;
   }
 
   const BeamNow& now_;
   ShotLimits limits_;
-  BeamProblem problem_;
-  LensPrior prior_;
-  Eigen::MatrixXd information_;
+  ForeseenBeam foreseen_;
   Eigen::Vector3d centre_in_board_ = Eigen::Vector3d::Zero();
 };
 

@@ -9,15 +9,26 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
+/// A shot behind what is known, whose board's pose was found.
+struct TakenShot {
+  double range_m = 0.0;
+  Rigid3 cam_from_board;
+  bool has_spot = false;
+};
+
 /// What is known of the beam, and what the next shots will be measured with.
 struct BeamNow {
   Beam beam;      ///< With covariance, and covariance with the lens.
   Camera camera;  ///< With covariance where known.
   std::vector<Eigen::Vector3d> points_in_board;
   RangefinderMethod method = RangefinderMethod::joint;
+  Refine refine = Refine::all;
+  /// Whether the next shots will have a spot and a board: as those behind it have.
+  bool sees_spots = true, sees_boards = true;
   double sigma_spot_px = 0.3;
   double sigma_corner_px = 0.2;
   bool estimate_scale = false;
+  std::vector<TakenShot> taken = {};  ///< For what they say of distortion that was held. May be empty.
 };
 
 struct ShotLimits {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "alidade/rangefinder/shot_plan.h"
 #include "alidade/testing/rangefinder_sample.h"
 
 namespace alidade {
@@ -35,25 +36,80 @@ double point_sigma_m(const Beam& beam) {
   return std::sqrt(sum);
 }
 
+/// The planned shots really taken: simulated at the planned poses, after those from before.
+RangefinderSample with_taken(const RangefinderSample& before, const std::vector<NextShot>& plan, const ShotNoise& noise,
+                             std::uint64_t seed) {
+  RangefinderSample taken = before;
+  RangefinderScene more = before.scene;
+  more.range_m.clear();
+  more.cam_from_board.clear();
+  for (const NextShot& shot : plan) {
+    // The board stands where the true beam meets it, not where the estimate says.
+    const Plane plane = plane_of(shot.cam_from_board);
+    more.cam_from_board.push_back(shot.cam_from_board);
+    more.range_m.push_back(-(plane.d_m + plane.normal_in_cam.dot(more.beam.origin_in_cam)) /
+                           plane.normal_in_cam.dot(more.beam.direction_in_cam));
+  }
+  for (const Shot& shot : simulate_shots(more, noise, seed).shots) taken.simulated.shots.push_back(shot);
+  return taken;
+}
+
+SolvedRangefinder solved(const RangefinderSample& sample, const RangefinderConfig& config) {
+  return solve_rangefinder(sample.simulated.shots, sample.points, sample.camera, config);
+}
+
+/// Planned σ over those that rangefinder() states with the planned shots, of the origin and of the direction: medians
+/// of nine logs, for what a log shows by chance is counted too.
+Eigen::Vector2d planned_over_stated(const RangefinderConfig& config, int num_shots, const ShotNoise& noise) {
+  RangefinderSceneConfig scene = *rangefinder_scenario("reference");
+  scene.num_shots = num_shots;
+  std::vector<double> origin, direction;
+  for (std::uint64_t seed = 1; seed <= 9; ++seed) {
+    const RangefinderSample before = draw_rangefinder_sample(scene, noise, seed);
+    const SolvedRangefinder now = solved(before, config);
+    const auto plan = plan_next_shots(beam_now(now.report, now.config), {}, 3);
+    if (plan.size() != 3) return Eigen::Vector2d::Zero();
+    const RangefinderReport after = solved(with_taken(before, plan, noise, seed + 77), config).report;
+    origin.push_back(plan.back().sigma_origin_m / after.bound.sigma_origin_m);
+    direction.push_back(plan.back().sigma_direction_rad / after.bound.sigma_direction_rad);
+  }
+  return {quantile_of(origin, 0.5), quantile_of(direction, 0.5)};
+}
+
+RangefinderConfig given_board() {
+  RangefinderConfig config = given_config(RangefinderMethod::joint);
+  config.board = rangefinder_scenario("reference")->board;
+  config.rates_next_shots = false;
+  return config;
+}
+
+void expect_ones(const Eigen::Vector2d& ratio) {
+  EXPECT_NEAR(ratio[0], 1.0, 0.1);
+  EXPECT_NEAR(ratio[1], 1.0, 0.1);
+}
+
+// The camera file is a pinhole's, without a word about distortion: eight shots do not ask for it, eleven do.
+TEST(NextShot, IsWorthWhatRangefinderStatesWithIt) { expect_ones(planned_over_stated(given_board(), 8, {})); }
+
+TEST(NextShot, LeavesWhatAFixedLensAddsToTheBeam) {
+  RangefinderConfig config = given_board();
+  config.refine = Refine::beam;
+  expect_ones(planned_over_stated(config, 8, {}));
+}
+
+TEST(NextShot, HasNoSpotWhereNoneWasSeen) { expect_ones(planned_over_stated(given_board(), 12, {.with_spot = false})); }
+
+TEST(NextShot, HasNoBoardWhereNoneWasSeen) {
+  expect_ones(planned_over_stated(given_board(), 18, {.with_board = false}));
+}
+
 TEST(NextShot, FiveGuidedShotsAreAsGoodAsFifteenRandomOnes) {
   double guided2 = 0.0, random2 = 0.0, truth2 = 0.0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Begun begun = begin(seed, 2);
     const auto plan = plan_next_shots(begun.now, {}, 5);
     ASSERT_EQ(plan.size(), 5u);
-    // Really taken: simulated at the planned poses and solved with the two from before.
-    RangefinderSample taken = begun.sample;
-    RangefinderScene more = begun.sample.scene;
-    more.range_m.clear();
-    more.cam_from_board.clear();
-    for (const NextShot& shot : plan) {
-      // The board stands where the true beam meets it, not where the estimate says.
-      const Plane plane = plane_of(shot.cam_from_board);
-      more.cam_from_board.push_back(shot.cam_from_board);
-      more.range_m.push_back(-(plane.d_m + plane.normal_in_cam.dot(more.beam.origin_in_cam)) /
-                             plane.normal_in_cam.dot(more.beam.direction_in_cam));
-    }
-    for (const Shot& shot : simulate_shots(more, {}, seed + 77).shots) taken.simulated.shots.push_back(shot);
+    const RangefinderSample taken = with_taken(begun.sample, plan, {}, seed + 77);
     const RangefinderReport guided = solve_sample(taken, given_config(RangefinderMethod::joint));
     const RangefinderReport random = solve_sample(begin(seed + 500, 17).sample, given_config(RangefinderMethod::joint));
     guided2 += std::pow(point_sigma_m(guided.beam), 2);

@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// 3σ of the origin and the direction now.
+/// σ of the origin and the direction now.
 double sigma_origin_m(const BeamNow& now) { return std::sqrt(now.beam.cov.topLeftCorner<3, 3>().trace()); }
 
 std::vector<std::string> shot_faults(const BeamNow& now, const ShotConfig& config) {
@@ -45,6 +45,32 @@ Verdict shots_verdict(const ShotPlan& plan) {
   return verdict;
 }
 
+/// That the next shots will be as those behind the beam.
+std::vector<Assumption> assumed_of(const BeamNow& now) {
+  std::vector<Assumption> assumed;
+  const auto assume = [&](const char* what) { assumed.push_back({.name = what, .value = std::nan(""), .sigma = 0.0}); };
+  if (!now.sees_spots) assume("no spot is seen, as in the shots given");
+  if (!now.sees_boards) assume("no board is used, as in the shots given");
+  return assumed;
+}
+
+/// What the shots behind the beam show. `have_corners`: boards were seen, not only given.
+void put_taken(const RangefinderReport& report, bool have_corners, BeamNow& now) {
+  bool any = false, spots = false, boards = false;
+  for (const ShotFit& shot : report.shots) {
+    if (!shot.used) continue;
+    const bool has_spot = shot.residual_px.allFinite();
+    any = true;
+    spots = spots || has_spot;
+    boards = boards || shot.plane || shot.pose;
+    const Eigen::Vector3d along = shot.point_in_cam - report.beam.origin_in_cam;
+    const double range_m = along.dot(report.beam.direction_in_cam) / report.beam.scale;
+    if (shot.pose && have_corners) now.taken.push_back({range_m, shot.pose->cam_from_board, has_spot});
+  }
+  now.sees_spots = spots || !any;
+  now.sees_boards = boards || !any;
+}
+
 }  // namespace
 
 FieldList fields_of(ShotConfig& config) {
@@ -62,6 +88,7 @@ ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config, const Progress
   plan.now = now;
   plan.shots = plan_next_shots(now, limits, config.shots, progress);
   plan.counts.given = plan.counts.used = 1;
+  plan.assumed = assumed_of(now);
   plan.verdict = shots_verdict(plan);
   return plan;
 }
@@ -69,9 +96,11 @@ ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config, const Progress
 BeamNow beam_now(const RangefinderReport& report, const RangefinderConfig& config) {
   BeamNow now{.beam = report.beam, .camera = report.camera, .points_in_board = {}};
   now.method = config.method;
+  now.refine = config.refine;
   now.estimate_scale = config.estimate_scale;
   if (report.sigma_spot_px > 0.0) now.sigma_spot_px = report.sigma_spot_px;
   if (report.sigma_corner_px > 0.0) now.sigma_corner_px = report.sigma_corner_px;
+  put_taken(report, config.board.has_value(), now);
   now.points_in_board = points_in_board(config.board.value_or(Board{.cols = 9, .rows = 6, .square_m = 0.04}));
   return now;
 }

@@ -23,6 +23,7 @@ struct ShotConfig {
 struct ShotPlan {
   BeamNow now;
   std::vector<NextShot> shots;
+  std::vector<Assumption> assumed;  ///< What the shots to come will not have either.
   Counts counts;
   Verdict verdict;
 };

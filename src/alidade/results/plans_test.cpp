@@ -8,11 +8,15 @@
 #include "alidade/calibrate.h"
 #include "alidade/files/files.h"
 #include "alidade/observe.h"
+#include "alidade/rangefinder.h"
 #include "alidade/results/observation_result.h"
 #include "alidade/results/observe_outcome.h"
 #include "alidade/results/photos_outcome.h"
+#include "alidade/results/rangefinder_outcome.h"
+#include "alidade/results/rangefinder_result.h"
 #include "alidade/results/result_board.h"
 #include "alidade/results/shots_outcome.h"
+#include "alidade/simulate/rangefinder.h"
 #include "alidade/simulate/rotation.h"
 #include "alidade/testing/calibration_sample.h"
 #include "alidade/testing/temporary_folder.h"
@@ -83,6 +87,43 @@ TEST(Plans, AnObservationIsReadAsItWasWritten) {
   ASSERT_FALSE(free.quantities.empty()) << free.verdict.sentence;
   EXPECT_THROW((void)read_back(free), InputError);
   EXPECT_THROW((void)observed_now(free), ConfigError);
+}
+
+/// Shots of a simulated rangefinder; those in excess of `num_spots` have none.
+std::vector<Shot> shots_of(int num_spots) {
+  RangefinderSceneConfig scene = *rangefinder_scenario("reference");
+  scene.num_shots = 12;
+  std::vector<Shot> shots = simulate_shots(draw_rangefinder_scene(scene, 2), {}, 2).shots;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    shots[i].name = "shot " + std::to_string(i);
+    if (static_cast<int>(i) >= num_spots) shots[i].spot.reset();
+  }
+  return shots;
+}
+
+TEST(Plans, ARangefinderIsReadAsItWasWritten) {
+  const RangefinderSceneConfig scene = *rangefinder_scenario("reference");
+  for (const int num_spots : {12, 0}) {
+    for (const Refine refine : {Refine::all, Refine::beam}) {
+      const RangefinderConfig config{.refine = refine, .board = scene.board, .sigma_range_m = 0.002};
+      const RangefinderCalibration report = rangefinder(shots_of(num_spots), scene.camera, config);
+      ASSERT_TRUE(report.verdict.ok()) << report.verdict.sentence;
+      const testing::TemporaryFolder folder;
+      const JobOutcome outcome = outcome_of(report, "");
+      write_file(folder.path() / "result.json", result_text(outcome.document));
+      for (const auto& file : outcome.files) write_file(folder.path() / file.name, file.bytes);
+      const BeamNow read = read_rangefinder(folder.path()), now = beam_now(report, report.config);
+      EXPECT_EQ(read.refine, refine);
+      EXPECT_EQ(read.sees_spots, num_spots > 0);
+      EXPECT_TRUE(read.sees_boards);
+      ASSERT_EQ(read.taken.size(), now.taken.size());
+      const ShotPlan a = plan_shots(now), b = plan_shots(read);
+      ASSERT_EQ(a.shots.size(), b.shots.size());
+      EXPECT_NEAR(a.shots.back().sigma_origin_m / b.shots.back().sigma_origin_m, 1.0, 0.01);
+      EXPECT_NEAR(a.shots.back().sigma_direction_rad / b.shots.back().sigma_direction_rad, 1.0, 0.01);
+      EXPECT_EQ(outcome_of(a).document.assumed.size(), num_spots > 0 ? 0u : 1u);
+    }
+  }
 }
 
 TEST(Plans, AnswerWhatCannotBe) {

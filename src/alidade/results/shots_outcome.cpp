@@ -55,9 +55,11 @@ JobOutcome outcome_of(const ShotPlan& plan) {
   ResultDocument& document = outcome.document;
   document.command = "plan rangefinder";
   document.counts = plan.counts;
+  document.assumed = plan.assumed;
   document.verdict = plan.verdict;
   if (plan.shots.empty()) return outcome;
   for (std::size_t i = 0; i < plan.shots.size(); ++i) outcome.lines.push_back(shot_line(plan.shots[i], i + 1));
+  for (const Assumption& assumed : plan.assumed) outcome.lines.push_back("assumed: " + assumed.name);
   const Beam& beam = plan.now.beam;
   document.data.push_back(planned_shots_table(plan.shots));
   document.data.push_back(points_in_board_table(plan.now.points_in_board));

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "alidade/geometry/so3.h"
+#include "alidade/rangefinder/checks/repeated_shots.h"
 #include "alidade/rangefinder/solve/foreseen_beam.h"
 
 namespace alidade {
@@ -27,14 +28,15 @@ class Planner {
     double score = std::numeric_limits<double>::infinity();  ///< Mean variance of the points measured. [m²]
   };
 
-  /// None where the camera does not see the board whole.
+  /// None where the camera does not see the board whole, and where rangefinder() would average the shot with one
+  /// that is taken.
   [[nodiscard]] std::optional<Gain> gain_of(double distance_m, double tilt_rad, double azimuth_rad) const {
     Gain gain;
     const Rigid3 cam_from_board = board_at(distance_m, tilt_rad, azimuth_rad);
     gain.shot = {distance_m, tilt_rad, azimuth_rad, cam_from_board, 0.0, 0.0, 0.0};
     gain.seen.range_m = distance_m;
     gain.seen.board = foreseen_.board_at(cam_from_board);
-    if (!gain.seen.board) return std::nullopt;
+    if (!gain.seen.board || is_taken(gain.seen)) return std::nullopt;
     auto added = foreseen_.information_of(distance_m, cam_from_board, *gain.seen.board, now_.sees_spots);
     if (!added) return std::nullopt;
     const Eigen::MatrixXd cov = foreseen_.cov_with(*added);
@@ -70,6 +72,7 @@ class Planner {
   /// Takes the shot: what follows counts it.
   NextShot take(const Gain& gain) {
     foreseen_.add(gain.information);
+    taken_.push_back(gain.seen);
     const BeamBound bound = foreseen_.bound();
     NextShot shot = gain.shot;
     shot.sigma_origin_m = bound.sigma_origin_m;
@@ -79,6 +82,10 @@ class Planner {
   }
 
  private:
+  [[nodiscard]] bool is_taken(const Shot& shot) const {
+    return std::ranges::any_of(taken_, [&](const Shot& taken) { return at_one_placement(taken, shot); });
+  }
+
   /// The board's centre where the beam hits, its normal tilted so that the azimuth's side is farther.
   [[nodiscard]] Rigid3 board_at(double distance_m, double tilt_rad, double azimuth_rad) const {
     const Eigen::Vector3d axis(std::sin(azimuth_rad), -std::cos(azimuth_rad), 0.0);
@@ -100,6 +107,7 @@ class Planner {
   const BeamNow& now_;
   ShotLimits limits_;
   ForeseenBeam foreseen_;
+  std::vector<Shot> taken_;
   Eigen::Vector3d centre_in_board_ = Eigen::Vector3d::Zero();
 };
 

@@ -47,7 +47,8 @@ struct NextShot {
 };
 
 /// The shots that lower the uncertainty most, one after the other: each the best over distances, tilts and sides by the
-/// mean variance of the points that the beam will measure from its origin to the farthest range.
+/// mean variance of the points that the beam will measure from its origin to the farthest range. Fewer where no other
+/// is left that rangefinder() would not average with one of these.
 [[nodiscard]] std::vector<NextShot> plan_next_shots(const BeamNow& now, const ShotLimits& limits, int num_shots,
                                                     const Progress& progress = {});
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "alidade/rangefinder/checks/repeated_shots.h"
 #include "alidade/rangefinder/shot_plan.h"
 #include "alidade/testing/rangefinder_sample.h"
 
@@ -101,6 +102,31 @@ TEST(NextShot, HasNoSpotWhereNoneWasSeen) { expect_ones(planned_over_stated(give
 
 TEST(NextShot, HasNoBoardWhereNoneWasSeen) {
   expect_ones(planned_over_stated(given_board(), 18, {.with_board = false}));
+}
+
+/// The shots as they would be measured, without errors.
+std::vector<Shot> seen(const BeamNow& now, const std::vector<NextShot>& plan) {
+  std::vector<Shot> shots;
+  for (const NextShot& next : plan) {
+    Shot& shot = shots.emplace_back();
+    shot.range_m = next.distance_m;
+    shot.board.emplace();
+    for (std::size_t i = 0; i < now.points_in_board.size(); ++i)
+      shot.board->corners.push_back(
+          {static_cast<int>(i), *project(now.camera, next.cam_from_board * now.points_in_board[i])});
+  }
+  return shots;
+}
+
+TEST(NextShot, RepeatsNone) {
+  const BeamNow now = begin(1, 8).now;
+  const auto few = plan_next_shots(now, {0.5, 0.6, 0.0}, 20);
+  EXPECT_EQ(few.size(), 8u);  // one a distance
+  for (const ShotLimits& limits : {ShotLimits{0.5, 0.6, 0.0}, {2.9, 3.0, 0.08}, {0.5, 4.0, 0.78}}) {
+    const auto shots = seen(now, plan_next_shots(now, limits, 20));
+    for (std::size_t i = 0; i < shots.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) EXPECT_FALSE(at_one_placement(shots[j], shots[i])) << i << ' ' << j;
+  }
 }
 
 TEST(NextShot, FiveGuidedShotsAreAsGoodAsFifteenRandomOnes) {

@@ -30,7 +30,7 @@ std::vector<std::string> shot_faults(const BeamNow& now, const ShotConfig& confi
   return found;
 }
 
-Verdict shots_verdict(const ShotPlan& plan) {
+Verdict shots_verdict(const ShotPlan& plan, int wanted) {
   Verdict verdict;
   if (plan.shots.empty()) {
     verdict.state = State::refused;
@@ -39,6 +39,12 @@ Verdict shots_verdict(const ShotPlan& plan) {
     verdict.to_add = "widen --min-range-m and --max-range-m";
     return verdict;
   }
+  if (static_cast<int>(plan.shots.size()) < wanted)
+    verdict.to_add = fmt::format(
+        "{} shot{} instead of {}: any other at these distances and tilts would repeat one of them, and be averaged "
+        "with "
+        "it; widen --min-range-m, --max-range-m and --max-tilt-deg for more",
+        plan.shots.size(), plan.shots.size() == 1 ? "" : "s", wanted);
   verdict.sentence = fmt::format("{} more shot{} lower 3σ of the origin from {:.2g} to {:.2g} mm", plan.shots.size(),
                                  plan.shots.size() == 1 ? "" : "s", 3e3 * sigma_origin_m(plan.now),
                                  3e3 * plan.shots.back().sigma_origin_m);
@@ -89,7 +95,7 @@ ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config, const Progress
   plan.shots = plan_next_shots(now, limits, config.shots, progress);
   plan.counts.given = plan.counts.used = 1;
   plan.assumed = assumed_of(now);
-  plan.verdict = shots_verdict(plan);
+  plan.verdict = shots_verdict(plan, config.shots);
   return plan;
 }
 

@@ -126,6 +126,17 @@ TEST(Plans, ARangefinderIsReadAsItWasWritten) {
   }
 }
 
+TEST(Plans, FewerShotsThanAskedForAreSaid) {
+  const RangefinderSceneConfig scene = *rangefinder_scenario("reference");
+  const RangefinderConfig config{.board = scene.board, .sigma_range_m = 0.002};
+  const RangefinderCalibration report = rangefinder(shots_of(12), scene.camera, config);
+  const BeamNow now = beam_now(report, report.config);
+  const ShotPlan few = plan_shots(now, {.shots = 10, .min_range_m = 0.6, .max_range_m = 0.65, .max_tilt_deg = 0.0});
+  EXPECT_LT(few.shots.size(), 10u);
+  EXPECT_NE(few.verdict.to_add.find("instead of 10"), std::string::npos) << few.verdict.to_add;
+  EXPECT_EQ(plan_shots(now, {.shots = 3}).verdict.to_add, "");
+}
+
 TEST(Plans, AnswerWhatCannotBe) {
   const CalibratedNow now = calibrated();
   for (const int bad : {0, -1, 21}) {

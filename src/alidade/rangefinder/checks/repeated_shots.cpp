@@ -22,14 +22,6 @@ bool same_board(const Shot& a, const Shot& b) {
   return a.plane && b.plane && same_plane(*a.plane, *b.plane);
 }
 
-bool at_one_placement(const Shot& first, const Shot& shot) {
-  constexpr double near_reading_m = 5e-3, near_share = 5e-3;
-  if (!(std::abs(shot.range_m - first.range_m) <= std::max(near_reading_m, near_share * first.range_m))) return false;
-  if (first.spot.has_value() != shot.spot.has_value()) return false;
-  if (first.spot && !((first.spot->px - shot.spot->px).norm() <= near_px)) return false;
-  return same_board(first, shot);
-}
-
 Shot averaged(std::span<const Shot> shots) {
   Shot mean = shots.front();
   const auto count = static_cast<double>(shots.size());
@@ -48,6 +40,14 @@ Shot averaged(std::span<const Shot> shots) {
 }
 
 }  // namespace
+
+bool at_one_placement(const Shot& first, const Shot& shot) {
+  constexpr double near_reading_m = 5e-3, near_share = 5e-3;
+  if (!(std::abs(shot.range_m - first.range_m) <= std::max(near_reading_m, near_share * first.range_m))) return false;
+  if (first.spot.has_value() != shot.spot.has_value()) return false;
+  if (first.spot && !((first.spot->px - shot.spot->px).norm() <= near_px)) return false;
+  return same_board(first, shot);
+}
 
 AveragedShots averaged_shots(std::span<const Shot> shots) {
   AveragedShots result;

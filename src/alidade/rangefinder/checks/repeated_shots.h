@@ -15,6 +15,9 @@ struct AveragedShots {
   std::vector<SkippedInput> repeated;  ///< The others, each with the one that it was averaged with.
 };
 
+/// Whether a shot is of the placement of another: see averaged_shots().
+[[nodiscard]] bool at_one_placement(const Shot& first, const Shot& shot);
+
 /// A board that stands for several readings has one error of its corners, of the spot and of the instrument at that
 /// range, not several: n such shots, counted as independent, would divide the variance by n. One placement: consecutive
 /// shots with a board whose corners (pose, plane) and spot are within a pixel (1 mm, 1 mrad) of those of the first, and

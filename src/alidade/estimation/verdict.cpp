@@ -56,6 +56,16 @@ void heed_assumptions(const std::vector<Assumption>& assumed, Verdict& verdict) 
   heed(assumed_check(assumed), worst != nullptr ? worst->remedy : "", verdict);
 }
 
+void heed_gain(double ratio, const std::string& remedy, Verdict& verdict) {
+  constexpr double hundredth_less = 0.99;
+  Check check{.name = "gain", .value = ratio, .limit = hundredth_less, .unit = "1"};
+  const bool gains = ratio <= hundredth_less;
+  check.state = gains ? State::good : State::care;
+  check.text = gains ? "what is known becomes better by " + text_of(100.0 * (1.0 - ratio), 2) + " %"
+                     : "what is known becomes better by less than 1 %";
+  heed(check, remedy, verdict);
+}
+
 std::string text_of(double value, int digits) {
   char text[32];
   std::snprintf(text, sizeof text, "%.*g", digits, value);

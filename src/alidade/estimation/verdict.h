@@ -70,6 +70,10 @@ void heed(const Check& check, const std::string& remedy, Verdict& verdict);
 /// Both of the above.
 void heed_assumptions(const std::vector<Assumption>& assumed, Verdict& verdict);
 
+/// A plan whose steps lower nothing that matters by a hundredth becomes State::care. `ratio`: the least of what is
+/// known after them over the same now.
+void heed_gain(double ratio, const std::string& remedy, Verdict& verdict);
+
 /// The value with so many significant digits, as sentences and checks quote it.
 [[nodiscard]] std::string text_of(double value, int digits = 3);
 

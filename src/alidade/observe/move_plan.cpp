@@ -27,11 +27,18 @@ std::string now_fault(const ObservedNow& now) {
   return "";
 }
 
-Verdict moves_verdict(const MovePlan& plan) {
+Verdict moves_verdict(const MovePlan& plan, const MoveLimits& limits) {
   Verdict verdict;
   if (plan.moves.empty()) {
     verdict.state = State::refused;
     verdict.exit_code = ExitCode::undetermined;
+    if (!is_short_enough(shortest_way_rad(limits), limits)) {
+      verdict.sentence = fmt::format("no move can be proposed: at {:.2g}°/s the shortest, of {:.2g}°, takes {:.2g} s",
+                                     plan.config.rate_deg_s, shortest_way_rad(limits) / degree,
+                                     shortest_way_rad(limits) / limits.rate_rad_per_s);
+      verdict.to_add = "raise --rate-deg-s, or lower --max-turn-deg";
+      return verdict;
+    }
     verdict.sentence = "no move can be proposed: this camera sees no point that tells more of it";
     verdict.to_add = "track points first";
     return verdict;
@@ -40,6 +47,7 @@ Verdict moves_verdict(const MovePlan& plan) {
                         after = 3.0 * plan.moves.back().sigma_px;
   verdict.sentence = fmt::format("{} moves lower 3σ of fx from {:.2g} to {:.2g} px, of fy from {:.2g} to {:.2g} px",
                                  plan.moves.size(), before[0], after[0], before[1], after[1]);
+  heed_gain(after.cwiseQuotient(before).minCoeff(), "raise --max-turn-deg, or track more points first", verdict);
   return verdict;
 }
 
@@ -68,7 +76,7 @@ MovePlan plan_moves(const ObservedNow& now, const MoveConfig& config, const Prog
   const MoveLimits limits{config.rate_deg_s * degree, config.max_turn_deg * degree, config.roll, now.frames_per_s};
   plan.moves = plan_next_moves(now, limits, config.moves, progress);
   if (!plan.moves.empty()) plan.counts.given = plan.counts.used = 1;
-  plan.verdict = moves_verdict(plan);
+  plan.verdict = moves_verdict(plan, limits);
   return plan;
 }
 

@@ -15,6 +15,7 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t max_points = 50;
+constexpr double shortest_length = 0.33;  // of the way allowed
 
 /// The covariance (normalised) if every pixel erred by itself: with its σ, and correlations as stated.
 Eigen::Matrix4d model_covariance(const ObservedNow& now, const Eigen::Matrix4d& cov) {
@@ -51,6 +52,7 @@ class Planner {
     double least = std::numeric_limits<double>::infinity();
     const RotationBundle so_far = bundle_;
     for (const Eigen::Vector3d& target : candidates()) {
+      if (!is_short_enough((target - at_).cwiseAbs().maxCoeff(), limits_)) continue;
       bundle_ = so_far;
       NextMove move{target, travel(target)};
       if (!(move.duration_s > 0.0)) continue;
@@ -73,7 +75,7 @@ class Planner {
  private:
   [[nodiscard]] std::vector<Eigen::Vector3d> candidates() const {
     std::vector<Eigen::Vector3d> targets;
-    for (const double length : {0.33, 0.66, 1.0}) {
+    for (const double length : {shortest_length, 0.66, 1.0}) {
       for (int i = 0; i < 8; ++i) {
         const double angle = i * std::numbers::pi / 4.0;
         targets.emplace_back(limits_.max_turn_rad * length * std::cos(angle),
@@ -209,6 +211,15 @@ void assume_estimated(const std::string& quantity, double sigma, std::vector<Ass
                                                         {"mount_z_rad", "mount about z"}};
   const auto name = names.find(quantity);
   if (name != names.end()) assumed.push_back({.name = name->second, .sigma = sigma});
+}
+
+double shortest_way_rad(const MoveLimits& limits) {
+  return shortest_length * std::numbers::sqrt2 / 2.0 * limits.max_turn_rad;  // of the longer axis
+}
+
+bool is_short_enough(double way_rad, const MoveLimits& limits) {
+  constexpr double max_frames = 1e5;
+  return way_rad / limits.rate_rad_per_s * limits.frames_per_s <= max_frames;
 }
 
 std::vector<NextMove> plan_next_moves(const ObservedNow& now, const MoveLimits& limits, int num_moves,

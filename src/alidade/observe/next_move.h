@@ -16,9 +16,15 @@ struct MoveLimits {
   double frames_per_s = 30.0;
 };
 
+/// The shortest way to a pose that is tried, but for none.
+[[nodiscard]] double shortest_way_rad(const MoveLimits& limits);
+/// Whether a way has frames that can be counted, one at least: 100 000 at most, near an hour at 30 a second.
+[[nodiscard]] bool is_short_enough(double way_rad, const MoveLimits& limits);
+
 /// The moves that lower the uncertainty of fx, fy, cx, cy most, one after the other: each is the best of rotations in
 /// eight directions and three lengths (and rolls), by the information of the pixels along the move, with the points'
-/// bearings unknown. Empty: no point is seen, or none stays in the image.
+/// bearings unknown. Empty: no point is seen, none stays in the image, or
+/// every move takes too long.
 [[nodiscard]] std::vector<NextMove> plan_next_moves(const ObservedNow& now, const MoveLimits& limits, int num_moves,
                                                     const Progress& progress = {});
 

@@ -150,6 +150,18 @@ TEST(NextMove, PromisesNothingOfACameraThatCannotBe) {
   }
 }
 
+TEST(NextMove, PromisesNothingOfMovesThatTakeForEverOrGainNothing) {
+  SwaysThenMoves head(1);
+  ObservedNow now = observed_now(head.observed());
+  EXPECT_EQ(plan_moves(now).verdict.state, State::good);
+  const Verdict slow = plan_moves(now, {.rate_deg_s = 1e-9}).verdict;
+  EXPECT_EQ(slow.exit_code, ExitCode::undetermined) << slow.sentence;
+  EXPECT_NE(slow.to_add.find("--rate-deg-s"), std::string::npos);
+  now.cov_px2 = 1e-8 * Eigen::Matrix4d::Identity();
+  now.sigma_model_px.setConstant(1e-4);
+  EXPECT_EQ(plan_moves(now).verdict.state, State::care);
+}
+
 TEST(NextMove, PointsAreWhereTheyAreAtTheEnd) {
   std::vector<ObserveResidual> seen;
   for (int row = 0; row < 40; ++row)

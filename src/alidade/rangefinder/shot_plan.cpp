@@ -14,6 +14,10 @@ namespace {
 /// σ of the origin and the direction now.
 double sigma_origin_m(const BeamNow& now) { return std::sqrt(now.beam.cov.topLeftCorner<3, 3>().trace()); }
 
+double sigma_direction_rad(const BeamNow& now) {
+  return std::sqrt(now.beam.cov.block<2, 2>(beam_direction_param, beam_direction_param).trace());
+}
+
 std::vector<std::string> shot_faults(const BeamNow& now, const ShotConfig& config) {
   ShotConfig copy = config;
   std::vector<std::string> found = faults_of(fields_of(copy));
@@ -48,6 +52,10 @@ Verdict shots_verdict(const ShotPlan& plan, int wanted) {
   verdict.sentence = fmt::format("{} more shot{} lower 3σ of the origin from {:.2g} to {:.2g} mm", plan.shots.size(),
                                  plan.shots.size() == 1 ? "" : "s", 3e3 * sigma_origin_m(plan.now),
                                  3e3 * plan.shots.back().sigma_origin_m);
+  const NextShot& last = plan.shots.back();
+  const double of_origin = last.sigma_origin_m / sigma_origin_m(plan.now);
+  const double of_direction = last.sigma_direction_rad / sigma_direction_rad(plan.now);
+  heed_gain(std::min(of_origin, of_direction), "widen --min-range-m, --max-range-m and --max-tilt-deg", verdict);
   return verdict;
 }
 

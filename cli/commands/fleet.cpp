@@ -59,55 +59,104 @@ struct WorkerArgs {
   std::string size, from;
 };
 
+struct FleetLine {
+  std::size_t number = 0;
+  std::string id, row;
+};
+
 /// Lines "CAMERA ROW" of a file, as simulate fleet leaves them.
-std::vector<std::pair<std::string, std::string>> read_rows(const std::string& path) {
+std::vector<FleetLine> read_rows(const std::string& path) {
   std::ifstream in(path);
   if (!in) throw InputError(path + ": cannot be read");
-  std::vector<std::pair<std::string, std::string>> rows;
+  std::vector<FleetLine> rows;
   std::string line;
   for (std::size_t number = 1; std::getline(in, line); ++number) {
     const std::size_t space = line.find(' ');
     if (space == std::string::npos) throw InputError(fmt::format("{}:{}: is not 'CAMERA ROW'", path, number));
-    rows.emplace_back(line.substr(0, space), line.substr(space + 1));
+    rows.push_back({number, line.substr(0, space), line.substr(space + 1)});
   }
+  if (rows.empty()) throw InputError(path + ": holds no rows");
   return rows;
+}
+
+/// The cameras of a file, and what came of its rows.
+struct OfflineFleet {
+  std::map<std::string, FleetCamera> cameras;
+  std::string alarms;
+  std::size_t num_alarms = 0;
+  Counts counts;
+};
+
+/// Of rows that say nothing the first ones are named.
+void note_fault(const std::string& path, const FleetLine& line, FleetFault fault, Counts& counts) {
+  constexpr std::size_t most_named = 20;
+  ++counts.dropped;
+  if (counts.skipped.size() < most_named)
+    counts.skipped.push_back({path, line.number, line.id + ": " + sentence_of(fault)});
+}
+
+OfflineFleet through_one_worker(const std::vector<FleetLine>& lines, const WorkerArgs& args, const Progress& progress) {
+  OfflineFleet fleet;
+  std::string fault;
+  for (const FleetLine& line : lines) {
+    if (fleet.counts.given % 1024 == 0) report_progress(progress, "rows", fleet.counts.given, lines.size());
+    const auto row = parse_fleet_row(line.row, fault);
+    FleetCamera& camera = fleet.cameras[line.id];
+    if (!row || row->n != camera.n + 1)
+      throw InputError(
+          fmt::format("{}:{}: a row of {}: {}", args.from, line.number, line.id, row ? "n is not the next" : fault));
+    ++fleet.counts.given;
+    if (const auto alarm = advance(camera, *row, args.options.config)) {
+      fleet.alarms += fleet_alarm_text(line.id, *alarm) + "\n";
+      ++fleet.num_alarms;
+    }
+    if (camera.last_fault != FleetFault::none) note_fault(args.from, line, camera.last_fault, fleet.counts);
+  }
+  fleet.counts.used = fleet.counts.given - fleet.counts.dropped;
+  return fleet;
+}
+
+/// Rows that say nothing are told; a camera that knows nothing because of them, or ends with one, is named.
+Verdict offline_verdict(const OfflineFleet& fleet, double rows_per_s) {
+  const std::size_t num = fleet.cameras.size();
+  Verdict verdict;
+  verdict.sentence =
+      fmt::format("{} rows of {} camera{}, {} alarms; {:.0f} rows a second, {} bytes a camera", fleet.counts.given, num,
+                  num == 1 ? "" : "s", fleet.num_alarms, rows_per_s, sizeof(FleetCamera));
+  if (fleet.counts.dropped > 0) verdict.sentence += fmt::format("; {} rows say nothing", fleet.counts.dropped);
+  std::vector<std::string> faulty;
+  for (const auto& [id, camera] : fleet.cameras)
+    if (camera.last_fault != FleetFault::none) faulty.push_back(id + ": " + verdict_of(camera).sentence);
+  if (faulty.empty()) return verdict;
+  verdict.state = State::care;
+  verdict.sentence += "; " + faulty.front();
+  if (faulty.size() > 1) verdict.sentence += fmt::format(", and {} more cameras", faulty.size() - 1);
+  verdict.to_add = "send t, the rotation and the points of every row as numbers: states.jsonl names the cameras";
+  if (fleet.counts.used == 0) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::undetermined;
+  }
+  return verdict;
 }
 
 /// The rows of a file through one worker, without a broker.
 ExitCode work_offline(const WorkerArgs& args, Run& run) {
-  const auto rows = read_rows(args.from);
+  const auto lines = read_rows(args.from);
   run.lap("read");
-  std::map<std::string, FleetCamera> cameras;
-  std::string alarms, fault;
-  std::size_t num_taken = 0, num_alarms = 0;
-  for (const auto& [id, text] : rows) {
-    if (num_taken % 1024 == 0) report_progress(run.progress, "rows", num_taken, rows.size());
-    const auto row = parse_fleet_row(text, fault);
-    FleetCamera& camera = cameras[id];
-    if (!row || row->n != camera.n + 1)
-      throw InputError(fmt::format("{}: a row of {}: {}", args.from, id, row ? "n is not the next" : fault));
-    ++num_taken;
-    if (const auto alarm = advance(camera, *row, args.options.config)) {
-      alarms += fleet_alarm_text(id, *alarm) + "\n";
-      ++num_alarms;
-    }
-  }
+  OfflineFleet fleet = through_one_worker(lines, args, run.progress);
   run.lap("rows");
-  const double rate = static_cast<double>(num_taken) / run.document.seconds.back().second;
+  const double rate = static_cast<double>(lines.size()) / run.document.seconds.back().second;
   std::string states;
-  for (const auto& [id, camera] : cameras) states += fleet_state_text(id, camera) + "\n";
+  for (const auto& [id, camera] : fleet.cameras) states += fleet_state_text(id, camera) + "\n";
   run.add_file("states.jsonl", std::move(states));
-  run.add_file("alarms.jsonl", std::move(alarms));
-  run.document.estimate["rows"] = num_taken;
-  run.document.estimate["cameras"] = cameras.size();
-  run.document.estimate["alarms"] = num_alarms;
+  run.add_file("alarms.jsonl", std::move(fleet.alarms));
+  run.document.estimate["rows"] = lines.size();
+  run.document.estimate["cameras"] = fleet.cameras.size();
+  run.document.estimate["alarms"] = fleet.num_alarms;
   run.document.estimate["rows_per_s"] = rate;
   run.document.estimate["bytes_a_camera"] = sizeof(FleetCamera);
-  run.document.counts.given = run.document.counts.used = num_taken;
-  Verdict verdict;
-  verdict.sentence = fmt::format("{} rows of {} cameras, {} alarms; {:.0f} rows a second, {} bytes a camera", num_taken,
-                                 cameras.size(), num_alarms, rate, sizeof(FleetCamera));
-  return run.finish(verdict);
+  run.document.counts = fleet.counts;
+  return run.finish(offline_verdict(fleet, rate));
 }
 
 ExitCode fleet_worker(WorkerArgs& args, Run& run) {

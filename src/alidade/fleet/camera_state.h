@@ -23,6 +23,9 @@ enum class FleetPhase : std::uint8_t {
 
 enum class FleetAlarmKind : std::uint8_t { none, pan_zero, tilt_zero, focal_length, frozen, lost, focal_temperature };
 
+/// Why nothing can be taken from a row.
+enum class FleetFault : std::uint8_t { none, time, rotation, another_rotation };
+
 /// A row of a camera: what its rotation was, and where it saw static points. NaN: not seen.
 struct FleetRow {
   std::int64_t n = 0;
@@ -90,6 +93,7 @@ struct FleetCamera {
   std::uint32_t stride = 1, since_kept = 0;  ///< Every so many rows one is kept to learn from.
   double frozen_since_s = 0.0;
   float temperature_c = std::numeric_limits<float>::quiet_NaN();  ///< The last that was known.
+  FleetFault last_fault = FleetFault::none;                       ///< Of the last row.
   union Body {
     FleetLearning learning;
     FleetTracking tracking;

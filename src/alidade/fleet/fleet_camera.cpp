@@ -109,7 +109,55 @@ std::optional<FleetAlarm> watch_fit(FleetCamera& camera, const FleetRow& row) {
   return FleetAlarm{FleetAlarmKind::lost, row.n, row.t_s, static_cast<double>(lost_rows), 1.0, row.t_s};
 }
 
+/// What a camera is, but for a last row that says nothing.
+Verdict verdict_of_state(const FleetCamera& camera) {
+  Verdict verdict;
+  if (camera.num_frozen >= frozen_rows) {
+    verdict.state = State::bad;
+    verdict.sentence = "the image is frozen";
+  } else if (camera.phase == FleetPhase::learning) {
+    verdict.state = State::refused;
+    verdict.sentence = camera.stride > 1
+                           ? "the rows so far do not determine the camera: turn it about both axes"
+                           : fmt::format("learning: {} of {} rows", camera.num_buffered, fleet_learning_rows);
+  } else if (camera.num_gated > frozen_rows) {
+    verdict.state = State::bad;
+    verdict.sentence = fmt::format("the last {} rows do not fit the camera", camera.num_gated);
+  } else if (camera.last_alarm != FleetAlarmKind::none && camera.t_s - camera.alarm_t_s < fresh_s) {
+    verdict.state = State::care;
+    verdict.sentence =
+        fmt::format("{}, said at {:.1f} s, and followed since", what_happened(camera.last_alarm), camera.alarm_t_s);
+  } else {
+    verdict.sentence = "as it was learned";
+  }
+  return verdict;
+}
+
 }  // namespace
+
+FleetFault fault_of(const FleetCamera& camera, const FleetRow& row) {
+  const auto is_usual = [](double r) { return std::abs(r) < max_rad; };
+  const auto& r = row.rotation;
+  const double length2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
+  if (!std::isfinite(row.t_s)) return FleetFault::time;
+  if (!std::ranges::all_of(r, is_usual)) return FleetFault::rotation;
+  if (row.source == FleetSource::attitude && !(length2 > 0.0)) return FleetFault::rotation;
+  return camera.has_row != 0 && row.source != camera.source ? FleetFault::another_rotation : FleetFault::none;
+}
+
+const char* sentence_of(FleetFault fault) {
+  switch (fault) {
+    case FleetFault::time:
+      return "t is not a number";
+    case FleetFault::rotation:
+      return "its rotation is not there, no number, or too large: pan and tilt, qw qx qy qz, or omega_x omega_y";
+    case FleetFault::another_rotation:
+      return "its rotation is of another kind than that of the first rows";
+    case FleetFault::none:
+      break;
+  }
+  return "";
+}
 
 std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& given, const FleetConfig& config) {
   const FleetRow row = believable(given, config);
@@ -119,8 +167,8 @@ std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& given, co
     const int num_points = std::clamp(row.num_points, static_cast<int>(camera.num_points), max_fleet_points);
     camera.num_points = static_cast<std::uint8_t>(num_points);
   }
-  const bool is_turned = std::ranges::all_of(row.rotation, [](double r) { return std::abs(r) < max_rad; });
-  if (row.source != camera.source || !std::isfinite(row.t_s) || !is_turned) return std::nullopt;
+  camera.last_fault = fault_of(camera, row);
+  if (camera.last_fault != FleetFault::none) return std::nullopt;
   const FleetRotation rotation = rotation_of(camera, row);
   if (!rotation.before.allFinite() || !rotation.after.allFinite()) return std::nullopt;
   bool is_frozen = false;
@@ -204,25 +252,11 @@ std::string sentence_of(const FleetAlarm& alarm) {
 }
 
 Verdict verdict_of(const FleetCamera& camera) {
-  Verdict verdict;
-  if (camera.num_frozen >= frozen_rows) {
-    verdict.state = State::bad;
-    verdict.sentence = "the image is frozen";
-  } else if (camera.phase == FleetPhase::learning) {
-    verdict.state = State::refused;
-    verdict.sentence = camera.stride > 1
-                           ? "the rows so far do not determine the camera: turn it about both axes"
-                           : fmt::format("learning: {} of {} rows", camera.num_buffered, fleet_learning_rows);
-  } else if (camera.num_gated > frozen_rows) {
-    verdict.state = State::bad;
-    verdict.sentence = fmt::format("the last {} rows do not fit the camera", camera.num_gated);
-  } else if (camera.last_alarm != FleetAlarmKind::none && camera.t_s - camera.alarm_t_s < fresh_s) {
-    verdict.state = State::care;
-    verdict.sentence =
-        fmt::format("{}, said at {:.1f} s, and followed since", what_happened(camera.last_alarm), camera.alarm_t_s);
-  } else {
-    verdict.sentence = "as it was learned";
-  }
+  Verdict verdict = verdict_of_state(camera);
+  const std::string fault = sentence_of(camera.last_fault);
+  if (fault.empty()) return verdict;
+  verdict.sentence += "; the last row says nothing: " + fault;
+  if (verdict.state == State::good) verdict.state = State::care;
   return verdict;
 }
 

@@ -31,6 +31,11 @@ struct FleetAlarm {
 /// Biometrika 41, 1954.
 [[nodiscard]] std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& row, const FleetConfig& config);
 
+/// Why advance() takes nothing from a row but its number.
+[[nodiscard]] FleetFault fault_of(const FleetCamera& camera, const FleetRow& row);
+/// "t is not a number".
+[[nodiscard]] const char* sentence_of(FleetFault fault);
+
 /// What is known of a camera after its last row.
 struct FleetEstimate {
   bool has_value = false;

@@ -195,6 +195,31 @@ TEST(FleetRow, IsReadAsJsonAndCborOrRefused) {
     EXPECT_FALSE(parse_fleet_row(text, fault)) << text;
 }
 
+/// A row that says nothing is one, whatever it is that is no number; a camera of such rows says why it learns nothing.
+TEST(Fleet, NamesWhatItCannotUse) {
+  FleetSceneConfig config;
+  config.event_share = 0.0;
+  const FleetScene scene = draw_fleet_scene(config, 7, 3);
+  std::string fault;
+  const auto row = [&](const std::string& members) { return *parse_fleet_row("{" + members + "}", fault); };
+  FleetCamera fresh;
+  for (const char* pan : {"", "\"pan\":\"x\",", "\"pan\":1e300,", "\"pan\":true,", "\"pan\":null,"}) {
+    (void)advance(fresh, row("\"n\":1,\"t\":1," + std::string(pan) + "\"tilt\":0.1,\"p1x\":9,\"p1y\":9"), fleet_config);
+    EXPECT_EQ(fresh.last_fault, FleetFault::rotation) << pan;
+  }
+  EXPECT_NE(verdict_of(fresh).sentence.find("rotation is not there"), std::string::npos) << verdict_of(fresh).sentence;
+  Watched watched = watch(scene, config, 100);
+  EXPECT_EQ(watched.camera.last_fault, FleetFault::none);
+  EXPECT_EQ(verdict_of(watched.camera).state, State::good);
+  (void)advance(watched.camera, row("\"n\":101,\"t\":1e300,\"pan\":0,\"tilt\":0"), fleet_config);
+  EXPECT_EQ(watched.camera.last_fault, FleetFault::time);
+  (void)advance(watched.camera, row("\"n\":102,\"t\":102,\"qw\":1,\"qx\":0,\"qy\":0,\"qz\":0"), fleet_config);
+  EXPECT_EQ(watched.camera.last_fault, FleetFault::another_rotation);
+  EXPECT_EQ(verdict_of(watched.camera).state, State::care);
+  (void)advance(watched.camera, row_of(scene, config, 103), fleet_config);
+  EXPECT_EQ(verdict_of(watched.camera).state, State::good);
+}
+
 /// Rows that say nothing, or nonsense: each has its state, and none stops the camera for good.
 TEST(Fleet, BearsAnyRow) {
   FleetSceneConfig config;

@@ -14,12 +14,13 @@ function countsOf(doc: Doc): string[] {
   const parts: string[] = [], {used, given, dropped} = doc.counts;
   const word = doc.command === 'rig' && doc.table('cameras') ? 'observations' : doc.command === 'observe' && doc.table('photos') ? 'photos' : whatIsCounted[doc.command.split(' ')[0]!] ?? 'inputs';
   if (used !== undefined && !/^(plan|simulate|camera) /.test(doc.command)) parts.push(`${used}${given !== undefined && given > used ? ` of ${given}` : ''} ${(given ?? used) === 1 ? word.replace(/s$/, '') : word} used`);
+  const isThinned = doc.command === 'rig' && doc.table('cameras') !== null;  // what a knot of the path does not need is not used
   const averaged = doc.skipped.filter((one) => one.reason.endsWith(': averaged with it')).length;
   const corners = doc.command === 'calibrate' ? doc.table('corners') : null;
   const rejected = corners ? corners.numbers('weight').filter((w) => w === 0).length : 0;
   if (corners && doc.isAnswer) parts.push(`${corners.thinned?.from ?? corners.rows} corners (${rejected} rejected)`);
   else if (corners) parts.push(`${corners.thinned?.from ?? corners.rows} corners`);
-  else if (dropped !== undefined && dropped > averaged && doc.command !== 'track') parts.push(`${dropped - averaged} rejected`);  // of a track some only waited for its start
+  else if (dropped !== undefined && dropped > averaged && doc.command !== 'track' && !isThinned) parts.push(`${dropped - averaged} rejected`);  // of a track some only waited for its start
   if (averaged > 0) parts.push(`${averaged} averaged with the one before`);
   if (doc.skipped.length > averaged && doc.command !== 'calibrate') parts.push(`${doc.skipped.length - averaged} skipped`);
   if (Number.isFinite(doc.estimate('rms_px')))

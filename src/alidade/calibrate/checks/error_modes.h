@@ -49,6 +49,9 @@ struct ErrorMode {
 /// Of a print with these points; all are of size 1.
 [[nodiscard]] std::vector<ErrorMode> error_modes(std::span<const Eigen::Vector3d> board_points);
 
+/// What it ordinarily is: of a print, a lens (2 px at the image's corner), its rays and a hand.
+[[nodiscard]] double ordinary_size(const ErrorMode& mode, const Camera& camera);
+
 /// "the print is 0.12 ± 0.04 % too long …"; what to do about it, where it is none of the print.
 [[nodiscard]] std::string sentence_of(const ErrorMode& mode, double size, double sigma);
 [[nodiscard]] std::string remedy_of(const ErrorMode& mode);

@@ -183,9 +183,13 @@ double sigmas_of(const VectorXd& by, const MatrixXd& cov) {
   return std::sqrt(squared_mahalanobis(scaled, scaled_by(scale, cov)));
 }
 
-/// What the modes `found`, estimated together, move the lens by, with what they themselves are uncertain by.
-VectorXd count_modes(const ReducedModes& all, const std::vector<Index>& found, double variance, MatrixXd& cov) {
-  const Ldlt information(MatrixXd(all.information(found, found)));
+/// What the modes `found`, estimated together, move the lens by, with what they themselves are uncertain by. `prior`:
+/// precision of each about 0.
+VectorXd count_modes(const ReducedModes& all, const std::vector<Index>& found, const std::vector<double>& prior,
+                     double variance, MatrixXd& cov) {
+  MatrixXd H = all.information(found, found);
+  for (std::size_t i = 0; i < found.size(); ++i) H(static_cast<Index>(i), static_cast<Index>(i)) += variance * prior[i];
+  const Ldlt information(H);
   const MatrixXd follows = all.follows(Eigen::all, found);
   const VectorXd moved = -follows * information.solve(VectorXd(all.score(found)));
   cov += moved * moved.transpose() + variance * follows * information.solve_each(follows.transpose());
@@ -195,10 +199,15 @@ VectorXd count_modes(const ReducedModes& all, const std::vector<Index>& found, d
 /// Which modes the photos show, and the one to name.
 class ModeFindings {
  public:
-  ModeFindings(const ReducedModes& all, const std::vector<ErrorMode>& modes, double noise_px, std::size_t num_views,
-               ModelErrors& errors)
-      : all_(all), modes_(modes), noise_px_(noise_px), num_views_(num_views), errors_(errors) {
-    for (Index m = 0; m < std::ssize(modes); ++m) estimates_.push_back(mode_estimate_of(all, m, noise_px));
+  ModeFindings(const ReducedModes& all, const std::vector<ErrorMode>& modes, const CalibrateReport& report,
+               std::size_t num_views, ModelErrors& errors)
+      : all_(all),
+        modes_(modes),
+        camera_(report.camera),
+        noise_px_(report.noise_px),
+        num_views_(num_views),
+        errors_(errors) {
+    for (Index m = 0; m < std::ssize(modes); ++m) estimates_.push_back(mode_estimate_of(all, m, noise_px_));
   }
 
   /// A mode by itself; whether it is included.
@@ -225,6 +234,8 @@ class ModeFindings {
   [[nodiscard]] double sigma(Index m) const { return estimates_[static_cast<std::size_t>(m)].sigma(); }
   [[nodiscard]] const std::vector<Index>& found() const { return found_; }
   [[nodiscard]] double variance() const { return variance_; }
+  /// Of few photos chance shows sizes that no lens has: what is not proved counts as far as it is ordinary.
+  [[nodiscard]] const std::vector<double>& prior() const { return prior_; }
 
  private:
   /// Not what lens and poses do.
@@ -256,7 +267,12 @@ class ModeFindings {
   }
 
   void include(Index m, double sigmas, bool is_proved) {
-    if (std::ranges::count(found_, m) == 0) found_.push_back(m);
+    const auto at = static_cast<std::size_t>(std::ranges::find(found_, m) - found_.begin());
+    if (at == found_.size()) {
+      found_.push_back(m);
+      prior_.push_back(std::pow(ordinary_size(modes_[static_cast<std::size_t>(m)], camera_), -2));
+    }
+    if (is_proved) prior_[at] = 0.0;
     variance_ = std::max(variance_, sigma(m) * sigma(m) * all_.information(m, m));
     if (sigmas <= largest_) return;
     const ErrorMode& mode = modes_[static_cast<std::size_t>(m)];
@@ -270,11 +286,13 @@ class ModeFindings {
 
   const ReducedModes& all_;
   const std::vector<ErrorMode>& modes_;
+  const Camera& camera_;
   double noise_px_;
   std::size_t num_views_;
   ModelErrors& errors_;
   std::vector<ModeEstimate> estimates_;
   std::vector<Index> found_;
+  std::vector<double> prior_;
   double variance_ = 0.0, largest_ = 0.0;
 };
 
@@ -293,7 +311,7 @@ ModelErrors model_errors(std::span<const BoardView> views, const CalibrateReport
   if (!all) return errors;
 
   const MatrixXd stated = report.camera.cov(free, free);
-  ModeFindings findings(*all, modes, report.noise_px, used.size(), errors);
+  ModeFindings findings(*all, modes, report, used.size(), errors);
   MatrixXd cov = MatrixXd::Zero(std::ssize(free), std::ssize(free));
   for (Index m = 0; m < std::ssize(modes); ++m) {
     if (findings.take(m) || modes[static_cast<std::size_t>(m)].kind != ErrorMode::Kind::lengths) continue;
@@ -305,7 +323,7 @@ ModelErrors model_errors(std::span<const BoardView> views, const CalibrateReport
   findings.take_together(ErrorMode::Kind::pupil, ErrorMode::Kind::plate_y);
   findings.take_together(ErrorMode::Kind::motion_x, ErrorMode::Kind::motion_z);
   if (!findings.found().empty())
-    errors.moves = sigmas_of(count_modes(*all, findings.found(), findings.variance(), cov), stated);
+    errors.moves = sigmas_of(count_modes(*all, findings.found(), findings.prior(), findings.variance(), cov), stated);
   errors.cov(free, free) = cov;
   return errors;
 }

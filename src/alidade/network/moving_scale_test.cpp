@@ -126,5 +126,19 @@ TEST(PathMatch, ATruePathThatIsLateIsNamed) {
   }
 }
 
+/// It was a rig of kilometres, at ●.
+TEST(PathMatch, ATruePathInMillimetresIsNamed) {
+  const testing::MovingScene scene = testing::scene_of(testing::loops, 1, false);
+  TrueTrack truth;
+  for (double t_s = -1.0; t_s < 41.0; t_s += 0.2) {
+    truth.t_s.push_back(t_s);
+    truth.position.emplace_back(1000.0 * testing::loops(t_s));
+  }
+  const Verdict verdict =
+      moving_target_verdict(place_cameras(scene.observations, testing::unplaced(scene), {}, truth), {});
+  EXPECT_EQ(verdict.state, State::care);
+  EXPECT_NE(verdict.to_add.find("is the path in metres"), std::string::npos) << verdict.to_add;
+}
+
 }  // namespace
 }  // namespace alidade

@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/network/moving_target.h"
 
@@ -147,8 +150,24 @@ void add_focals(const MovingTargetReport& report, Verdict& verdict) {
       {"focal lengths", is_quiet ? State::good : State::care, text, most.sigmas(), focal_limit, "σ", ""});
 }
 
+/// A true path in millimetres gives a rig of kilometres that fits as well.
+void add_speed(const MovingTargetReport& report, Verdict& verdict) {
+  constexpr double beyond_any_m_s = 500.0;
+  std::vector<double> speeds_m_s;
+  for (std::size_t i = 1; i < report.path.size(); ++i)
+    if (const double apart_s = report.path_t_s[i] - report.path_t_s[i - 1]; apart_s > 0.0)
+      speeds_m_s.push_back((report.path[i] - report.path[i - 1]).norm() / apart_s);
+  const double speed_m_s = median_of(std::move(speeds_m_s));
+  if (speed_m_s < beyond_any_m_s) return;
+  verdict.checks.push_back({"true path's unit", State::care,
+                            "by the true path the target moves at " + text_of(speed_m_s, 2) +
+                                " m/s: is the path in metres, and are its times in seconds?",
+                            speed_m_s, beyond_any_m_s, "m/s", ""});
+}
+
 void add_truth(const MovingTargetReport& report, Verdict& verdict) {
   if (!(report.truth_covered > 0.0)) return;
+  add_speed(report, verdict);
   verdict.checks.push_back({"true path", report.truth_covered > 0.9 ? State::good : State::care,
                             "met within " + text_of(report.truth_median_m, 2) +
                                 " m (median) after a similarity, over " + text_of(100.0 * report.truth_covered) +

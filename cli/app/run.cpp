@@ -74,7 +74,16 @@ void Run::add_file(std::string name, std::string content) {
 
 void Run::add_file_elsewhere(const std::filesystem::path& file, std::string_view content) {
   begin_writing();
-  elsewhere_.emplace_back(file.parent_path()).add(file.filename(), content);
+  if (takes_bytes(file)) {
+    streams_.push_back({file.string(), std::string(content)});
+    return;
+  }
+  const std::filesystem::path place = place_of(file);
+  elsewhere_.emplace_back(place.parent_path()).add(place.filename(), content);
+}
+
+void Run::write_streams() const {
+  for (const NamedBytes& stream : streams_) write_file(stream.name, stream.bytes);
 }
 
 void Run::add_image(std::string name, std::string jpeg) { images_.push_back({std::move(name), std::move(jpeg)}); }
@@ -88,6 +97,7 @@ ExitCode Run::finish(Verdict verdict) {
   document.seconds.insert(document.seconds.begin(), {"total", seconds_since(start_)});
   if (options.keeps_outcome) {
     begin_writing();
+    write_streams();
     for (FolderSwap& swap : elsewhere_) swap.commit();
     return document.verdict.exit_code;
   }
@@ -98,6 +108,7 @@ ExitCode Run::finish(Verdict verdict) {
   if (options.leaves_results) {
     write_files();
   } else {
+    write_streams();
     print();
     for (FolderSwap& swap : elsewhere_) swap.commit();
   }
@@ -138,6 +149,7 @@ void Run::write_files() {
   for (const PendingFile& file : files_) folder.add(file.name, content_of(file));
   add_report(folder);
   report_progress(progress, "writing", 0, 0);  // the last moment at which Ctrl-C leaves nothing written
+  write_streams();
   print();
   for (FolderSwap& each : elsewhere_) each.commit();
   folder.commit();

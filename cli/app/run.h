@@ -62,7 +62,8 @@ class Run {
   void lap(std::string part);
   /// A file to be written into DIR by finish(). Many large ones wait on DIR's disk, not in memory.
   void add_file(std::string name, std::string content);
-  /// A file elsewhere that the user named, written by finish() as well.
+  /// A file elsewhere that the user named, written by finish() as well; a device or a pipe is written to, of a link
+  /// what it points to is replaced.
   void add_file_elsewhere(const std::filesystem::path& file, std::string_view content);
   /// The file of that name is all that finish() prints, if there is one: a table for the next program.
   void print_file(std::string name) { printed_file_ = std::move(name); }
@@ -99,6 +100,7 @@ class Run {
   void add_report(ResultFolder& folder);
   void warn(const std::string& line);
   void print() const;
+  void write_streams() const;
   [[nodiscard]] std::string summary() const;
   [[nodiscard]] std::string content_of(const PendingFile& file) const;
   [[nodiscard]] std::string printed_text() const;
@@ -109,7 +111,8 @@ class Run {
   std::size_t held_bytes_ = 0;  ///< Of the files in memory; beyond a limit they wait on disk.
   std::optional<Spool> spool_;
   std::list<FolderSwap> elsewhere_;
-  std::vector<NamedBytes> images_;  ///< JPEG, the most wanted first.
+  std::vector<NamedBytes> streams_;  ///< Devices and pipes elsewhere, and what they get.
+  std::vector<NamedBytes> images_;   ///< JPEG, the most wanted first.
   std::vector<std::string> lines_;
   std::string result_, printed_file_;
   std::filesystem::path folder_;  ///< Where the results stand: DIR, or DIR/refused.

@@ -2,11 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <thread>
 
 #include "alidade/camera/undistort.h"
 #include "alidade/formats/camera_file.h"
@@ -81,6 +83,24 @@ TEST_F(CameraCommand, ConvertWritesExactlyTheDestinationInEveryFormat) {
     EXPECT_EQ(outcome.out.find("cannot hold the covariance") == std::string::npos, keeps_covariance) << format;
   }
   EXPECT_FALSE(exists("alidade-out"));
+}
+
+// As root it left files in place of a device, a pipe and a link.
+TEST_F(CameraCommand, ConvertWritesToPipesAndThroughLinks) {
+  write("a.yaml", brown_camera());
+  ASSERT_EQ(alidade({"convert", "a.yaml", "ros.yaml", "--to", "ros"}).code, 0);
+  const std::string expected = read_file(folder.path() / "ros.yaml");
+  ASSERT_EQ(::mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
+  std::string got;
+  std::thread reader([&] { got = read_file(folder.path() / "pipe"); });
+  EXPECT_EQ(alidade({"convert", "a.yaml", "pipe", "--to", "ros"}).code, 0);
+  reader.join();
+  EXPECT_EQ(got, expected);
+  EXPECT_TRUE(std::filesystem::is_fifo(folder.path() / "pipe"));
+  std::filesystem::create_symlink("target.yaml", folder.path() / "link.yaml");
+  EXPECT_EQ(alidade({"convert", "a.yaml", "link.yaml", "--to", "ros"}).code, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "link.yaml"));
+  EXPECT_EQ(read_file(folder.path() / "target.yaml"), expected);
 }
 
 TEST_F(CameraCommand, ConvertRefusesToLoseTheLensUnlessAllowed) {

@@ -56,12 +56,6 @@ void write_temporary(const std::filesystem::path& file, const std::filesystem::p
   sync_file(file, named);
 }
 
-/// A device, a pipe or a socket, which takes bytes and is not replaced; `file` or what it links to.
-bool is_no_file(const std::filesystem::path& file) {
-  struct stat status {};
-  return ::stat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
-}
-
 void write_through(const std::filesystem::path& file, std::string_view content) {
   const Descriptor out(::open(file.c_str(), O_WRONLY | O_CLOEXEC));
   if (!out.is_open()) fail_on(file, "cannot be written", errno);
@@ -113,17 +107,29 @@ std::string read_file(const std::filesystem::path& file) {
   }
 }
 
+bool takes_bytes(const std::filesystem::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+}
+
+std::filesystem::path place_of(const std::filesystem::path& file) {
+  constexpr int max_links = 40;  // as Linux follows
+  std::filesystem::path place = file;
+  std::error_code error;
+  for (int i = 0; i < max_links && std::filesystem::is_symlink(place, error); ++i)
+    place = place.parent_path() / std::filesystem::read_symlink(place, error);  // an absolute one stands for itself
+  return place;
+}
+
 void write_file(const std::filesystem::path& file, std::string_view content) {
   std::error_code error;
   if (file.filename().empty() || std::filesystem::is_directory(file, error)) {
     throw InputError(file.string() + ": is a folder, not a file");
   }
-  if (is_no_file(file)) {
+  if (takes_bytes(file))
     write_through(file, content);
-    return;
-  }
-  const bool is_link = std::filesystem::is_symlink(file, error);
-  replace_file(is_link ? std::filesystem::weakly_canonical(file, error) : file, content);
+  else
+    replace_file(place_of(file), content);
 }
 
 }  // namespace alidade

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
@@ -59,6 +61,17 @@ Eigen::MatrixXd by_similarity(const MovingProblem& problem, const Rig& rig, cons
   return moved;
 }
 
+/// The worst head's σ of position [m] and of attitude [rad].
+std::pair<double, double> worst_sigmas(const Eigen::MatrixXd& cov) {
+  std::pair<double, double> worst;
+  for (Eigen::Index at = 0; at < cov.rows(); at += num_head_params) {
+    const auto variance = cov.diagonal().segment<num_head_params>(at);
+    worst.first = std::max(worst.first, std::sqrt(variance.head<3>().sum()));
+    worst.second = std::max(worst.second, std::sqrt(variance.segment<3>(base_rotation_param).sum()));
+  }
+  return worst;
+}
+
 }  // namespace
 
 void take_covariance(const MovingProblem& problem, const MovingGiven& given, const Eigen::MatrixXd& cov_model,
@@ -72,23 +85,11 @@ void take_covariance(const MovingProblem& problem, const MovingGiven& given, con
   const Eigen::MatrixXd of_cameras = of_heads(problem, given.cov, scale);
   const Eigen::VectorXd longer = by_scale(problem, report.rig, sigma_scale);
   report.rig.cov = of_cameras + longer * longer.transpose();
-  for (std::size_t h = 0; h < problem.placed.size(); ++h) {
-    const auto variance =
-        report.rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
-    report.sigma_relative_m = std::max(report.sigma_relative_m, std::sqrt(variance.head<3>().sum()));
-    report.sigma_relative_rad =
-        std::max(report.sigma_relative_rad, std::sqrt(variance.segment<3>(base_rotation_param).sum()));
-  }
+  std::tie(report.sigma_relative_m, report.sigma_relative_rad) = worst_sigmas(report.rig.cov);
   if (match == nullptr) return;
   const Eigen::MatrixXd moved = by_similarity(problem, report.rig, *match);
   report.rig.cov = of_cameras + moved * moved.transpose();
-  for (std::size_t h = 0; h < problem.placed.size(); ++h) {
-    const auto variance =
-        report.rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
-    report.sigma_world_m = std::max(report.sigma_world_m, std::sqrt(variance.head<3>().sum()));
-    report.sigma_world_rad =
-        std::max(report.sigma_world_rad, std::sqrt(variance.segment<3>(base_rotation_param).sum()));
-  }
+  std::tie(report.sigma_world_m, report.sigma_world_rad) = worst_sigmas(report.rig.cov);
 }
 
 }  // namespace alidade

@@ -10,7 +10,8 @@
 namespace alidade {
 
 /// A departure from the grid, displacements of all points, from the lens model, those of all image points, or of rays
-/// that do not meet in one point, displacements of what they show.
+/// that do not meet in one point, displacements of what they show. Sizes: lengths a share, angle in rad, spacing [1/m],
+/// of the lens without unit (at unit focal length), of rays and motions [m].
 struct ErrorMode {
   enum class Kind {
     lengths,
@@ -40,16 +41,17 @@ struct ErrorMode {
 [[nodiscard]] Eigen::Vector2d displacement_of(ErrorMode::Kind kind, const Lens& lens,
                                               const Eigen::Vector3d& point_in_cam);
 
-/// Displacement of what is seen at `point_in_cam` against its ray, by size 1; `row`: where it is read, over the image's
-/// height, from the middle. A plate of thickness t, refractive index n and tilt α moves points towards itself by
-/// t (1 − tan θ' / tan θ), of which what no pose does is t (1 − 1/n²) / 2n · (θ² − 2 α θ_x) along the axis.
+/// Displacement [m, camera frame] of what is seen at `point_in_cam` against its ray, by size 1 m; `row`: where it is
+/// read, over the image's height, from the middle. A plate of thickness t, refractive index n and tilt α moves points
+/// towards itself by t (1 − tan θ' / tan θ), of which what no pose does is t (1 − 1/n²) / 2n · (θ² − 2 α θ_x) along the
+/// axis.
 [[nodiscard]] Eigen::Vector3d displacement_in_cam(ErrorMode::Kind kind, const Eigen::Vector3d& point_in_cam,
                                                   double row);
 
 /// Of a print with these points; all are of size 1.
 [[nodiscard]] std::vector<ErrorMode> error_modes(std::span<const Eigen::Vector3d> board_points);
 
-/// What it ordinarily is: of a print, a lens (2 px at the image's corner), its rays and a hand.
+/// What it ordinarily is, as a size: of a print, a lens (2 px at the image's corner), its rays and a hand.
 [[nodiscard]] double ordinary_size(const ErrorMode& mode, const Camera& camera);
 
 /// "the print is 0.12 ± 0.04 % too long …"; what to do about it, where it is none of the print.

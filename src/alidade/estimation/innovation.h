@@ -29,4 +29,10 @@ ALIDADE_PUBLIC_END
   const double a = 2.0 / (9.0 * num), b = is_estimated ? 2.0 / (9.0 * left) : 0.0, root = std::cbrt(F);
   return std::max(0.0, ((1.0 - b) * root - (1.0 - a)) / std::sqrt(b * root * root + a));
 }
+
+/// Of Student's distribution of so many degrees of freedom what `z` is of the normal one (Abramowitz & Stegun 26.7.5).
+[[nodiscard]] inline double students(double z, double dof) {
+  return z + (std::pow(z, 3) + z) / (4.0 * dof) +
+         (5.0 * std::pow(z, 5) + 16.0 * std::pow(z, 3) + 3.0 * z) / (96.0 * dof * dof);
+}
 }  // namespace alidade

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "alidade/calibrate/study.h"
+#include "alidade/estimation/innovation.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -22,17 +23,11 @@ using Eigen::VectorXd;
 constexpr std::size_t min_views = 6;
 constexpr std::string_view focal_length = LensChange::focal_length;
 using Profile = LensChange::Profile;
-/// Of a change of the focal length that is included in σ, though it may be chance (one clean set in 20 drifts, and one
-/// in 50 jumps somewhere): where it is proved the first photo is off by 5σ already.
-double included_from(Profile profile) {
-  switch (profile) {
-    case Profile::drift:
-      return 2.0;
-    case Profile::distance:  // which costs more where it is chance: far points are off by more than any photo
-      return 2.5;
-    default:
-      return 3.5;
-  }
+/// What of a change of the focal length may be chance, in σ: one clean set in 20 drifts by more, and one in 50 jumps
+/// somewhere. With the distance it costs more: far points are off by more than any photo. What is beyond is included
+/// in σ: where it is proved the first photo is off by 5σ already.
+double chance_sigmas(Profile profile) {
+  return profile == Profile::drift ? 2.0 : profile == Profile::distance ? 2.5 : 3.5;
 }
 
 /// What could change, as a direction in the lens parameters, and what each view says of it: its score γ, its
@@ -252,7 +247,13 @@ LensChange change_of(const Found& found, const Estimated& all, const CalibrateRe
   const double information = information_of(t, direction);
   LensChange change{.profile = found.profile, .what = direction.what, .at = found.at, .direction = direction.of_lens};
   change.size = -t.dot(direction.score) / information;
-  change.sigma = std::max(report.noise_px / std::sqrt(information), sigma_of(t, found, all, change.size, information));
+  const double by_noise = report.noise_px / std::sqrt(information),
+               by_scatter = sigma_of(t, found, all, change.size, information);
+  change.sigma = std::max(by_noise, by_scatter);
+  const double chance = chance_sigmas(found.profile);
+  const double by_chance =
+      std::max(chance * by_noise, students(chance, static_cast<double>(t.size()) - 2.0) * by_scatter);
+  change.share_beyond_chance = std::max(0.0, 1.0 - std::pow(by_chance / change.size, 2));
   change.mean_square = change.size * change.size * t.squaredNorm() / static_cast<double>(t.size());
   change.course.assign(t.begin(), t.end());
   for (const Index at : all.split.free) {
@@ -305,7 +306,8 @@ LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateRep
       change.is_proved = sigmas > proved_from(found) && is_of_the_order(found, order);
       // What warming up or a creeping focus comes to, and what focusing does.
       const double most_unproved = profile == Profile::distance ? most : 0.01;
-      const bool is_included = is_focal && sigmas > included_from(profile) && std::abs(change.size) < most_unproved;
+      const bool is_included = is_focal && change.share_beyond_chance > 0.0 && std::abs(change.size) < most_unproved;
+      if (!change.is_proved) change.mean_square *= change.share_beyond_chance;
       // A proved one goes before one that is only included.
       const double weight = sigmas * (change.is_proved ? 100.0 : is_included ? 1.0 : 0.0);
       if (weight > 0.0) found_changes.emplace_back(weight, std::move(change));

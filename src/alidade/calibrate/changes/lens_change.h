@@ -26,8 +26,10 @@ struct LensChange {
   double moves = 0.0;         ///< Of the photo that is farthest from the stated lens, in σ of a parameter.
   Eigen::VectorXd direction;  ///< Of all lens parameters, for a change of one.
   bool is_proved = false;
-  double mean_square = 0.0;    ///< Of the photos' departures from the stated lens; by distance, of far points.
-  std::vector<double> course;  ///< Of each view, about the mean, in units of `size`.
+  double share_beyond_chance = 0.0;  ///< Of the size's square, what chance does not show.
+  double mean_square = 0.0;          ///< Of the photos' departures from the stated lens; by distance, of far points.
+                                     ///< Where it is not proved, of the share beyond chance.
+  std::vector<double> course;        ///< Of each view, about the mean, in units of `size`.
   double nearest_m = 0.0, farthest_m = 0.0;  ///< Boards.
 };
 
@@ -45,8 +47,8 @@ struct LensChangeStudy {
 /// length also with the board's inverse distance, by the noise
 /// of the corners and by the scatter of the photos, whichever is larger, which not more than one in fifty orders of the
 /// same photos shows as well: what the lens model does not explain is in all orders alike. A change of the focal length
-/// that is not proved is stated and included in σ from 2σ of a drift, 2.5σ with the distance, 3.5σ of a jump. `views`:
-/// in the order taken. docs/maths/honest-sigma.md.
+/// that is not proved is stated from 2σ of a drift, 2.5σ with the distance, 3.5σ of a jump (of Student's distribution
+/// by the photos' scatter); what is beyond is included in σ. `views`: in the order taken. docs/maths/honest-sigma.md.
 [[nodiscard]] LensChangeStudy lens_change(std::span<const ViewScore> views, const CalibrateReport& report);
 
 /// Everything but focal length and centre as all photos gave it: parts of them do not determine a lens' distortion.

@@ -44,8 +44,8 @@ Check check_of(const LensChangeStudy& study, std::span<const std::string> photos
   const LensChange& change = *study.change;
   check.value = change.moves;
   check.state = change.is_proved && change.moves > care_sigmas ? State::care : State::good;
-  check.text = course_text(change, photos) + ", and σ includes the change";
-  if (!change.is_proved) check.text = "not proved, but included in σ: " + check.text;
+  check.text = course_text(change, photos) + (change.is_proved ? ", and σ includes the change" : "");
+  if (!change.is_proved) check.text = "not proved, but what of it is beyond chance is included in σ: " + check.text;
   return check;
 }
 

@@ -21,7 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t least_views_of_modes = 6;
-constexpr double included_sigmas = 3.0, proved_sigmas = 4.0;
+constexpr double included_sigmas = 2.5, proved_sigmas = 4.0;
 
 /// Information and gradient of free lens parameters and modes, pose eliminated.
 struct ModeScore {
@@ -161,15 +161,18 @@ ModeEstimate mode_estimate_of(const ReducedModes& all, Index mode, double noise_
   return one;
 }
 
-/// Of Student's distribution what `z` is of the normal one (Abramowitz & Stegun 26.7.5).
-double student(double z, double dof) {
-  return z + (std::pow(z, 3) + z) / (4.0 * dof) +
-         (5.0 * std::pow(z, 5) + 16.0 * std::pow(z, 3) + 3.0 * z) / (96.0 * dof * dof);
+/// How much larger it is than what chance shows in `sigmas` σ.
+double times_chance(const ModeEstimate& one, double sigmas, std::size_t num_views) {
+  const double by_scatter = students(sigmas, static_cast<double>(num_views) - 2.0) * one.by_scatter;
+  return std::abs(one.size) / std::max(sigmas * one.by_noise, by_scatter);
 }
 
-bool is_beyond(const ModeEstimate& one, double sigmas, std::size_t num_views) {
-  return std::abs(one.size) > sigmas * one.by_noise &&
-         std::abs(one.size) > student(sigmas, static_cast<double>(num_views) - 2.0) * one.by_scatter;
+/// What is counted of a mode that is so much larger than chance: its square less that of chance. Terms of a lens do
+/// nearly what its own parameters do: where boards are they hardly matter, and counting them costs most. Of those it is
+/// the size less that of chance.
+double share_beyond_chance(const ErrorMode& mode, double times) {
+  if (times <= 1.0) return 0.0;
+  return mode.is_of_lens() && !mode.is_of_rays() ? 1.0 - 1.0 / times : std::sqrt(1.0 - 1.0 / (times * times));
 }
 
 /// The ratio of the print's lengths is hardly ever known to better than this, and photos of an upright board hardly
@@ -183,15 +186,24 @@ double sigmas_of(const VectorXd& by, const MatrixXd& cov) {
   return std::sqrt(squared_mahalanobis(scaled, scaled_by(scale, cov)));
 }
 
-/// What the modes `found`, estimated together, move the lens by, with what they themselves are uncertain by. `prior`:
-/// precision of each about 0.
-VectorXd count_modes(const ReducedModes& all, const std::vector<Index>& found, const std::vector<double>& prior,
-                     double variance, MatrixXd& cov) {
-  MatrixXd H = all.information(found, found);
-  for (std::size_t i = 0; i < found.size(); ++i) H(static_cast<Index>(i), static_cast<Index>(i)) += variance * prior[i];
+/// A mode that the photos show.
+struct FoundMode {
+  Index mode = 0;
+  double prior = 0.0;  ///< Precision of it about 0: an ordinary size, where it is not proved.
+  double share = 1.0;  ///< That is counted.
+};
+
+/// What the modes `found`, estimated together, move the lens by, with what they themselves are uncertain by.
+VectorXd count_modes(const ReducedModes& all, const std::vector<FoundMode>& found, double variance, MatrixXd& cov) {
+  std::vector<Index> modes;
+  for (const FoundMode& each : found) modes.push_back(each.mode);
+  MatrixXd H = all.information(modes, modes), follows = all.follows(Eigen::all, modes);
+  for (Index i = 0; i < std::ssize(found); ++i) {
+    H(i, i) += variance * found[static_cast<std::size_t>(i)].prior;
+    follows.col(i) *= found[static_cast<std::size_t>(i)].share;
+  }
   const Ldlt information(H);
-  const MatrixXd follows = all.follows(Eigen::all, found);
-  const VectorXd moved = -follows * information.solve(VectorXd(all.score(found)));
+  const VectorXd moved = -follows * information.solve(VectorXd(all.score(modes)));
   cov += moved * moved.transpose() + variance * follows * information.solve_each(follows.transpose());
   return moved;
 }
@@ -213,8 +225,9 @@ class ModeFindings {
   /// A mode by itself; whether it is included.
   bool take(Index m) {
     const ModeEstimate& one = estimates_[static_cast<std::size_t>(m)];
-    if (!is_determined(m) || !is_beyond(one, included_sigmas, num_views_)) return false;
-    include(m, std::abs(one.size) / one.sigma(), is_beyond(one, proved_sigmas, num_views_));
+    const double times = times_chance(one, included_sigmas, num_views_);
+    if (!is_determined(m) || times <= 1.0) return false;
+    include(m, std::abs(one.size) / one.sigma(), times, times_chance(one, proved_sigmas, num_views_) > 1.0);
     return true;
   }
 
@@ -228,14 +241,13 @@ class ModeFindings {
     const double sigmas = group.empty() ? 0.0 : sigmas_together(group);
     if (sigmas < included_sigmas) return;
     std::ranges::sort(group, std::ranges::greater{}, [&](Index m) { return sigmas_alone(m); });
-    for (const Index m : group) include(m, m == group.front() ? sigmas : 0.0, sigmas > proved_sigmas);
+    for (const Index m : group)
+      include(m, m == group.front() ? sigmas : 0.0, sigmas / included_sigmas, sigmas > proved_sigmas);
   }
 
   [[nodiscard]] double sigma(Index m) const { return estimates_[static_cast<std::size_t>(m)].sigma(); }
-  [[nodiscard]] const std::vector<Index>& found() const { return found_; }
+  [[nodiscard]] const std::vector<FoundMode>& found() const { return found_; }
   [[nodiscard]] double variance() const { return variance_; }
-  /// Of few photos chance shows sizes that no lens has: what is not proved counts as far as it is ordinary.
-  [[nodiscard]] const std::vector<double>& prior() const { return prior_; }
 
  private:
   /// Not what lens and poses do.
@@ -266,13 +278,15 @@ class ModeFindings {
     return std::min(score_sigmas(by_noise, num, 0.0), score_sigmas(n * T2 / (n - 1.0 + T2), num, n));
   }
 
-  void include(Index m, double sigmas, bool is_proved) {
-    const auto at = static_cast<std::size_t>(std::ranges::find(found_, m) - found_.begin());
-    if (at == found_.size()) {
-      found_.push_back(m);
-      prior_.push_back(std::pow(ordinary_size(modes_[static_cast<std::size_t>(m)], camera_), -2));
-    }
-    if (is_proved) prior_[at] = 0.0;
+  /// Of few photos chance shows sizes that no lens has, and of many modes one: what is not proved counts by its share
+  /// beyond chance, and as far as it is ordinary.
+  void include(Index m, double sigmas, double times_of_chance, bool is_proved) {
+    const double share = share_beyond_chance(modes_[static_cast<std::size_t>(m)], times_of_chance);
+    auto at = std::ranges::find(found_, m, &FoundMode::mode);
+    if (at == found_.end())
+      at = found_.insert(at, {m, std::pow(ordinary_size(modes_[static_cast<std::size_t>(m)], camera_), -2), share});
+    at->share = std::max(at->share, share);
+    if (is_proved) *at = {.mode = m};
     variance_ = std::max(variance_, sigma(m) * sigma(m) * all_.information(m, m));
     if (sigmas <= largest_) return;
     const ErrorMode& mode = modes_[static_cast<std::size_t>(m)];
@@ -291,8 +305,7 @@ class ModeFindings {
   std::size_t num_views_;
   ModelErrors& errors_;
   std::vector<ModeEstimate> estimates_;
-  std::vector<Index> found_;
-  std::vector<double> prior_;
+  std::vector<FoundMode> found_;
   double variance_ = 0.0, largest_ = 0.0;
 };
 
@@ -323,7 +336,7 @@ ModelErrors model_errors(std::span<const BoardView> views, const CalibrateReport
   findings.take_together(ErrorMode::Kind::pupil, ErrorMode::Kind::plate_y);
   findings.take_together(ErrorMode::Kind::motion_x, ErrorMode::Kind::motion_z);
   if (!findings.found().empty())
-    errors.moves = sigmas_of(count_modes(*all, findings.found(), findings.prior(), findings.variance(), cov), stated);
+    errors.moves = sigmas_of(count_modes(*all, findings.found(), findings.variance(), cov), stated);
   errors.cov(free, free) = cov;
   return errors;
 }

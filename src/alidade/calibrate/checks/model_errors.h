@@ -18,8 +18,9 @@ struct ModelErrors {
   bool is_of_lens = false;  ///< The largest is an error of the lens or of its rays, not of the print.
   bool is_proved = false;   ///< The largest, from 4σ: one clean set in 800 has such.
   double moves = 0.0;       ///< Of the lens by what is significant, in its stated σ along the direction moved.
-  /// For the covariance of the lens: what is significant (from 3σ: one clean set in 20) moves it by, and the ratio of
-  /// the print's lengths where the photos separate it from fx / fy by less than the stated σ.
+  /// For the covariance of the lens: what is proved moves it by, and what is not by as much as is beyond the 2.5σ that
+  /// chance shows of one of so many; and the ratio of the print's lengths where the photos separate it from fx / fy by
+  /// less than the stated σ.
   Eigen::MatrixXd cov;
 };
 

@@ -133,6 +133,23 @@ std::vector<BoardView> views_of_higher_order(double at_corner_px, int draw) {
   return views;
 }
 
+// Chance shows one of seventeen modes at 3σ in one clean set in 20. From there it was counted in full: of seven photos
+// σ of k3 was 16 times the model's.
+TEST(ModelErrors, WhatIsNotProvedIsCountedByDegrees) {
+  double before = 0.0, largest = 0.0;
+  for (double at_corner_px = 0.0; at_corner_px < 12.0; at_corner_px += 0.25) {
+    const std::vector<BoardView> views = views_of_higher_order(at_corner_px, 0);
+    const CalibrateReport report = calibrate(sample_board, views, sample_size, {});
+    const ModelErrors errors = model_errors(views, report);
+    if (errors.is_proved) break;
+    const double counted = std::sqrt(errors.cov(9, 9) / report.model_cov(9, 9));
+    EXPECT_LT(counted - before, 2.0) << at_corner_px;
+    before = counted;
+    largest = std::max(largest, counted);
+  }
+  EXPECT_GT(largest, 2.0);
+}
+
 // Its lens was called adequate.
 TEST(ModelErrors, ALensOfAHigherOrderIsNamed) {
   const int draws = trials(4);

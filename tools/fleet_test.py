@@ -9,6 +9,7 @@ alidade-fleet: skipped (77). What the broker holds is read over its own protocol
 import json
 import pathlib
 import random
+import re
 import shutil
 import signal
 import socket
@@ -150,6 +151,18 @@ class Fleet(unittest.TestCase):
             process.send_signal(signal.SIGTERM)
             self.assertEqual(process.wait(20), 0)
         watch.stderr.close()
+
+    def test_workers_share_the_cameras(self):
+        expected = self.expected()
+        workers = [self.start(ALIDADE, "fleet", "worker", "--nats", self.url, "--size", "640x480", stderr=subprocess.PIPE, text=True) for _ in range(2)]
+        time.sleep(2)
+        self.assertEqual(self.publish().wait(120), 0)
+        self.wait_for(expected)
+        rows = []
+        for worker in workers:
+            worker.send_signal(signal.SIGTERM)
+            rows.append(int(re.search(r"(\d+) rows? of", worker.communicate(timeout=20)[1])[1]))
+        self.assertGreaterEqual(min(rows), CAMERAS * ROWS // 5, rows)
 
     def test_workers_and_the_broker_die(self):
         expected, chance = self.expected(), random.Random(1)

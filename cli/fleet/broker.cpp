@@ -106,9 +106,14 @@ bool Broker::make_streams() {
   return true;
 }
 
-KeyValues Broker::bucket(const std::string& name, double ttl_s) {
+KeyValues Broker::existing_bucket(const std::string& name) {
   kvStore* store = nullptr;
-  if (js_KeyValue(&store, jetstream_, name.c_str()) == NATS_OK) return KeyValues(store);
+  return KeyValues(js_KeyValue(&store, jetstream_, name.c_str()) == NATS_OK ? store : nullptr);
+}
+
+KeyValues Broker::bucket(const std::string& name, double ttl_s) {
+  if (KeyValues there = existing_bucket(name)) return there;
+  kvStore* store = nullptr;
   kvConfig config;
   kvConfig_Init(&config);
   config.Bucket = name.c_str();

@@ -46,6 +46,8 @@ class Broker {
   [[nodiscard]] bool make_streams();
   /// A bucket; `ttl_s` 0: keys stay.
   [[nodiscard]] KeyValues bucket(const std::string& name, double ttl_s);
+  /// None: it is not there.
+  [[nodiscard]] KeyValues existing_bucket(const std::string& name);
 
   /// A stream's messages from a sequence number on, in order, and new ones. None: not now.
   [[nodiscard]] Subscription read(const std::string& stream, const std::string& subject, std::uint64_t from);

@@ -5,16 +5,14 @@
 #include <cstdint>
 #include <string>
 
+#include "alidade/fleet/fleet_parts.h"
 #include "cli/fleet/broker.h"
 
 namespace alidade::fleet {
 
-/// Cameras are dealt into so many parts by their names, and parts to workers.
-inline constexpr int num_parts = 32;
-[[nodiscard]] int part_of(const std::string& camera);
-
 /// The partitions of this worker: leases in a bucket whose keys expire after two seconds unless they are renewed. A
 /// worker that stops renewing (is killed, or stalls) loses its partitions to the others, without a coordinator.
+/// Workers of earlier releases deal the cameras otherwise: whatever partition one of them holds is taken from it.
 class Shares {
  public:
   explicit Shares(Broker& broker);
@@ -24,6 +22,8 @@ class Shares {
   [[nodiscard]] bool keep();
   [[nodiscard]] bool holds(int part) const { return revision_[static_cast<std::size_t>(part)] > 0; }
   [[nodiscard]] int num_held() const;
+  /// Workers of an earlier release at this broker, by their marks.
+  [[nodiscard]] int num_earlier() const { return num_earlier_; }
   /// Of a worker that ends.
   void give_back();
 
@@ -31,12 +31,16 @@ class Shares {
   bool renew();
   bool take_and_give(int fair);
   [[nodiscard]] int num_workers();
+  /// A lease that is free, or of an earlier release's worker.
+  [[nodiscard]] bool take(int part);
+  [[nodiscard]] bool take_over(int part);
 
   Broker& broker_;
   KeyValues leases_;
   std::string id_;
   std::uint64_t own_revision_ = 0;
-  std::array<std::uint64_t, num_parts> revision_{};  ///< Of the lease; 0: none.
+  int num_earlier_ = 0;
+  std::array<std::uint64_t, num_fleet_parts> revision_{};  ///< Of the lease; 0: none.
   std::chrono::steady_clock::time_point next_ = {};
 };
 

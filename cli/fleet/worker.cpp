@@ -8,6 +8,7 @@
 #include <map>
 #include <thread>
 #include <unordered_map>
+#include <utility>
 
 #include "alidade/results/fleet_text.h"
 #include "cli/app/terminal.h"
@@ -18,6 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr const char* position_bucket = "ALIDADE_READ";
+constexpr const char* earlier_position_bucket = "ALIDADE_POSITION";  // of releases that dealt the cameras otherwise
 constexpr const char* checkpoint_header = "Alidade-Checkpoint";
 constexpr const char* expected_header = "Nats-Expected-Last-Subject-Sequence";
 constexpr std::size_t max_held = 256;  // rows of a camera that wait for one before them; then that one is given up
@@ -49,6 +52,8 @@ class Worker {
         continue;
       }
       const bool has_changed = shares_.keep();
+      if (shares_.num_earlier() > 0 && !std::exchange(has_said_earlier_, true))
+        tell("a worker of an earlier release is at this broker: it is left without cameras, and may be stopped");
       if (shares_.num_held() == 0) {
         rest();
         continue;
@@ -83,10 +88,10 @@ class Worker {
     alarms_.clear();
     num_early_ = 0;
     reconnects_ = broker_.num_reconnects();
-    if (!positions_) positions_ = broker_.bucket("ALIDADE_POSITION", 0.0);
+    if (!positions_) positions_ = broker_.bucket(position_bucket, 0.0);
     if (!positions_ || !load_states()) return false;
     std::uint64_t from = ~std::uint64_t{0};
-    for (int part = 0; part < num_parts; ++part) {
+    for (int part = 0; part < num_fleet_parts; ++part) {
       bool& is_read = is_read_[static_cast<std::size_t>(part)];
       is_read = shares_.holds(part);
       if (is_read) from = std::min(from, position_of(part));
@@ -117,7 +122,7 @@ class Worker {
 
   void load_state(const Message& message, std::uint64_t sequence) {
     const std::string id = camera_of(natsMsg_GetSubject(message.get()));
-    if (!shares_.holds(part_of(id))) return;
+    if (!shares_.holds(fleet_part_of(id))) return;
     Held held;
     held.state_sequence = sequence;
     const char* text = nullptr;
@@ -127,9 +132,20 @@ class Worker {
     cameras_[id] = std::move(held);
   }
 
+  /// Up to there all observations of a part are in the states.
   std::uint64_t position_of(int part) {
+    if (const auto position = position_in(positions_, part)) return *position;
+    // Never written: not before the least of an earlier release's, where that has all of them.
+    const KeyValues earlier = broker_.existing_bucket(earlier_position_bucket);
+    std::uint64_t least = ~std::uint64_t{0};
+    for (int each = 0; earlier && each < num_fleet_parts; ++each)
+      least = std::min(least, position_in(earlier, each).value_or(0));
+    return earlier ? least : 0;
+  }
+
+  static std::optional<std::uint64_t> position_in(const KeyValues& bucket, int part) {
     kvEntry* entry = nullptr;
-    if (kvStore_Get(&entry, positions_.get(), std::to_string(part).c_str()) != NATS_OK) return 0;
+    if (kvStore_Get(&entry, bucket.get(), std::to_string(part).c_str()) != NATS_OK) return std::nullopt;
     const char* text = kvEntry_ValueString(entry);
     const std::uint64_t position = text != nullptr ? std::strtoull(text, nullptr, 10) : 0;
     kvEntry_Destroy(entry);
@@ -167,7 +183,7 @@ class Worker {
     position_ = std::max(position_, place->sequence);
     ++since_flush_;
     const std::string id = camera_of(natsMsg_GetSubject(message.get()));
-    if (id.empty() || !is_read_[static_cast<std::size_t>(part_of(id))]) return;
+    if (id.empty() || !is_read_[static_cast<std::size_t>(fleet_part_of(id))]) return;
     std::string fault;
     const std::string_view payload(natsMsg_GetData(message.get()),
                                    static_cast<std::size_t>(natsMsg_GetDataLength(message.get())));
@@ -225,7 +241,7 @@ class Worker {
     }
     if (!store_states(states, whose)) return false;
     const std::string position = std::to_string(safe_position());
-    for (int part = 0; part < num_parts; ++part) {
+    for (int part = 0; part < num_fleet_parts; ++part) {
       // Of a part that has just come nothing has been read yet.
       if (!shares_.holds(part) || !is_read_[static_cast<std::size_t>(part)]) continue;
       std::uint64_t revision = 0;
@@ -269,9 +285,9 @@ class Worker {
   std::uint64_t position_ = 0;
   std::size_t num_rows_ = 0, num_faults_ = 0, num_early_ = 0, since_flush_ = 0;
   double flush_s_ = 0.0;
-  std::array<bool, num_parts> is_read_{};  ///< Parts whose states were loaded, and whose rows are taken in.
+  std::array<bool, num_fleet_parts> is_read_{};  ///< Parts whose states were loaded, and whose rows are taken in.
   int reconnects_ = 0;
-  bool is_reading_ = false;
+  bool is_reading_ = false, has_said_earlier_ = false;
   Clock::time_point last_flush_ = Clock::now(), last_message_ = Clock::now();
 };
 

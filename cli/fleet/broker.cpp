@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstring>
 #include <string_view>
+#include <thread>
 
 #include "alidade/files/files.h"
 
@@ -72,6 +73,26 @@ Broker::Broker(const BrokerOptions& options) {
     if (!acks_) s = NATS_ERR;
   }
   if (s != NATS_OK) fail(options, s);
+  require_jetstream(options);
+}
+
+/// A server that has just started may not have it yet. Other answers (a cluster without a leader) are waited for later.
+void Broker::require_jetstream(const BrokerOptions& options) {
+  jsOptions js;
+  jsOptions_Init(&js);
+  js.Wait = 1000;
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+  while (true) {
+    jsAccountInfo* info = nullptr;
+    jsErrCode error{};
+    const natsStatus s = js_GetAccountInfo(&info, jetstream_, &js, &error);
+    jsAccountInfo_Destroy(info);
+    const bool has_none = s == NATS_NO_RESPONDERS || error == JSNotEnabledErr || error == JSNotEnabledForAccountErr;
+    if (!has_none) return;
+    if (std::chrono::steady_clock::now() > until) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  throw InputError(options.url + ": the NATS server there has no JetStream: nats-server -a 127.0.0.1 -js -sd DIR");
 }
 
 Broker::~Broker() {
@@ -165,7 +186,7 @@ std::optional<std::pair<std::uint64_t, std::uint64_t>> Broker::extent(const std:
   return extent;
 }
 
-bool Broker::store(std::vector<Publication>& messages, int wait_ms) {
+bool Broker::store(std::vector<Publication>& messages, int wait_ms, const std::function<bool()>& goes_on) {
   const std::uint64_t round = ++num_stores_;
   std::size_t sent = 0, answered = 0;
   bool are_all = true;
@@ -186,6 +207,7 @@ bool Broker::store(std::vector<Publication>& messages, int wait_ms) {
     bool is_lost = false;
     const Message ack = next(acks_, 100, is_lost);
     if (std::chrono::steady_clock::now() > until || is_lost) return false;
+    if (!ack && goes_on && !goes_on()) return false;
     if (!ack) continue;
     const std::string_view subject = natsMsg_GetSubject(ack.get());
     const std::string_view mark = subject.substr(subject.rfind('.') + 1);

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -34,7 +35,8 @@ struct Publication {
   std::uint64_t sequence = 0;  ///< In its stream.
 };
 
-/// A connection to NATS with JetStream. What cannot be is thrown as InputError; a connection that is lost comes back.
+/// A connection to NATS with JetStream. What cannot be is thrown as InputError, a server without JetStream as well; a
+/// connection that is lost comes back.
 class Broker {
  public:
   explicit Broker(const BrokerOptions& options);
@@ -58,14 +60,17 @@ class Broker {
   /// Number of messages and last sequence number of a stream; none: not now.
   [[nodiscard]] std::optional<std::pair<std::uint64_t, std::uint64_t>> extent(const std::string& stream);
 
-  /// Sends all of them and waits until the broker has stored each, refused it, or timed out. True: all are stored.
-  bool store(std::vector<Publication>& messages, int wait_ms);
+  /// Sends all of them and waits until the broker has stored each, refused it, timed out, or it is to stop. True: all
+  /// are stored.
+  bool store(std::vector<Publication>& messages, int wait_ms, const std::function<bool()>& goes_on = {});
 
   /// Times that the connection came back.
   [[nodiscard]] int num_reconnects() const { return reconnects_; }
   [[nodiscard]] bool is_connected() const { return natsConnection_Status(connection_) == NATS_CONN_STATUS_CONNECTED; }
 
  private:
+  void require_jetstream(const BrokerOptions& options);
+
   std::atomic<int> reconnects_{0};
   natsConnection* connection_ = nullptr;
   jsCtx* jetstream_ = nullptr;

@@ -161,8 +161,78 @@ class Fleet(unittest.TestCase):
         rows = []
         for worker in workers:
             worker.send_signal(signal.SIGTERM)
-            rows.append(int(re.search(r"(\d+) rows? of", worker.communicate(timeout=20)[1])[1]))
+            rows.append(int(re.search(r"(\d+)(?: of \d+)? rows of", worker.communicate(timeout=20)[1])[1]))
         self.assertGreaterEqual(min(rows), CAMERAS * ROWS // 5, rows)
+
+    def rows_of(self, camera):
+        """The rows of a simulated camera."""
+        self.expected()
+        lines = (self.folder / "made/rows.txt").read_text().splitlines()
+        return [json.loads(line.split(" ", 1)[1]) for line in lines if line.startswith(camera + " ")]
+
+    def test_lost_rows_and_restarts_are_said(self):
+        rows = self.rows_of("c00004")
+        worker = self.start(ALIDADE, "fleet", "worker", "--nats", self.url, "--size", "640x480", stderr=subprocess.PIPE, text=True)
+        time.sleep(1.5)
+        slow = [{**row, "t": 10 * row["t"]} for row in rows]  # 1 Hz: a gap is given up after half a minute of them
+        sent = {"gap": [row for row in slow if row["n"] != 50],
+                "late": slow[9:],
+                "waits": [row for row in rows[:60] if row["n"] != 50],
+                "none": rows[9:20],
+                "reboot": rows[:100] + [{**row, "n": i + 1} for i, row in enumerate(rows[100:])]}
+        with Client(self.port) as client:
+            for camera, some in sent.items():
+                for row in some:
+                    client.ask(f"cam.{camera}.obs", json.dumps(row))
+            client.ask("cam.gap.obs", json.dumps(slow[9]))
+            client.ask("cam.gap.obs", "nonsense")
+            time.sleep(3)
+            states = {camera: json.loads(client.state(camera)) for camera in sent}
+        worker.send_signal(signal.SIGTERM)
+        said = worker.communicate(timeout=20)[1]
+        self.assertEqual({camera: state["n"] for camera, state in states.items()}, {"gap": ROWS, "late": ROWS, "waits": 49, "none": 0, "reboot": ROWS - 100})
+        self.assertEqual([states[camera].get(count, 0) for camera, count in (("gap", "missing"), ("late", "missing"), ("waits", "missing"), ("reboot", "restarts"))], [1, 9, 0, 1])
+        self.assertEqual(states["reboot"]["t"], rows[-1]["t"])
+        for camera, words in (("gap", "1 row never came"), ("late", "9 rows never came"), ("none", "wait for the first"), ("reboot", "its observer began anew")):
+            self.assertIn(words, states[camera]["verdict"]["sentence"])
+        for words in ("cam.gap.obs: one row before row 51 never came", "cam.gap.obs: row 10 came again, or too late", "cam.waits.obs: row 50 has not come", "cam.none.obs: row 1 has not come",
+                      "cam.reboot.obs: the observer began anew: row 1"):
+            self.assertIn(words, said)
+        taken = ROWS - 1 + ROWS - 9 + 49 + ROWS
+        self.assertIn(f"{taken} of {taken + 10 + 11 + 1 + 1} rows of 5 cameras taken in: 21 wait for one before them (", said)
+        self.assertTrue(said.rstrip().endswith("1 came again, or too late; 1 are no rows; 10 never came; 1 restart of an observer"), said)
+
+    def test_a_server_without_jetstream(self):
+        self.broker.kill()
+        self.broker.wait()
+        self.start("nats-server", "-a", "127.0.0.1", "-p", self.port, "-l", self.folder / "log")
+        for words in (["fleet", "worker", "--size", "640x480"], ["fleet", "watch", "--port", "0"], ["simulate", "fleet", "--publish", "--cameras", "2", "--rows", "3"]):
+            begin = time.monotonic()
+            done = subprocess.run([str(ALIDADE), *words, "--nats", self.url], capture_output=True, text=True, timeout=60, cwd=self.folder)
+            self.assertEqual(done.returncode, 3, done.stderr)
+            self.assertIn("has no JetStream", done.stderr)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+            self.assertLess(time.monotonic() - begin, 10)
+
+    def test_a_publisher_that_is_stopped(self):
+        for rate, known in ((0.01, 0), (1, 5)):  # the broker knows the first rows by their numbers
+            publisher = self.start(ALIDADE, "simulate", "fleet", "--cameras", "5", "--rows", "600", "--rate", rate, "--publish", "--nats", self.url, "--out", "stopped", stderr=subprocess.PIPE, text=True)
+            time.sleep(2)
+            publisher.send_signal(signal.SIGINT)
+            begin = time.monotonic()
+            said = publisher.communicate(timeout=20)[1]
+            self.assertLess(time.monotonic() - begin, 1.0)
+            self.assertEqual(publisher.returncode, 130)
+            rows = int(re.search(r"interrupted; (\d+) rows of 5 cameras are published; no files are written", said)[1])
+            self.assertEqual(rows - known, self.stored(), said)
+            self.assertGreaterEqual(rows, 5 + known)
+
+    def stored(self):
+        """Observations since the last time that this was asked."""
+        with Client(self.port) as client:
+            count = client.ask("$JS.API.STREAM.INFO.ALIDADE_OBS", "")["state"]["messages"]
+        before, self.counted = getattr(self, "counted", 0), count
+        return count - before
 
     def test_workers_and_the_broker_die(self):
         expected, chance = self.expected(), random.Random(1)

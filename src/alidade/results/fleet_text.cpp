@@ -115,14 +115,20 @@ FleetRow fleet_row_of(const FleetObservation& observation, std::int64_t n) {
   return row;
 }
 
-std::string fleet_state_text(const std::string& id, const FleetCamera& camera) {
+std::string fleet_state_text(const std::string& id, const FleetCamera& camera, const FleetNumbers& numbers) {
   const FleetEstimate estimate = estimate_of(camera);
   const Verdict verdict = verdict_of(camera);
+  const std::string order = sentence_of(numbers);
+  const std::string sentence = camera.n == 0 ? "no row is taken in yet: those that have come wait for the first ones"
+                                             : verdict.sentence + (order.empty() ? "" : "; " + order);
+  std::string counts;
+  if (numbers.num_missing > 0) counts += fmt::format(",\"missing\":{}", numbers.num_missing);
+  if (numbers.num_restarts > 0) counts += fmt::format(",\"restarts\":{}", numbers.num_restarts);
   return fmt::format(
       "{{\"camera\":{},\"n\":{},\"t\":{},\"verdict\":{{\"state\":\"{}\",\"sentence\":{}}},\"estimate\":{},\"stddev\":{}"
-      "}}",
-      quoted(id), camera.n, number_or_null(camera.t_s), state_name(verdict.state), quoted(verdict.sentence),
-      members(estimate.value, estimate.has_temperature), members(estimate.sigma, estimate.has_temperature));
+      "{}}}",
+      quoted(id), camera.n, number_or_null(camera.t_s), state_name(verdict.state), quoted(sentence),
+      members(estimate.value, estimate.has_temperature), members(estimate.sigma, estimate.has_temperature), counts);
 }
 
 std::string fleet_alarm_text(const std::string& id, const FleetAlarm& alarm) {
@@ -161,6 +167,11 @@ std::optional<FleetCamera> parse_checkpoint(std::string_view text) {
   FleetCamera camera;
   std::memcpy(static_cast<void*>(&camera), bytes.data(), sizeof camera);
   return camera;
+}
+
+std::int64_t fleet_state_n(std::string_view text) {
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+  return json.is_object() && json.contains("n") && json["n"].is_number_integer() ? json["n"].get<std::int64_t>() : 0;
 }
 
 }  // namespace alidade

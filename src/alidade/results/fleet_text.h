@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "alidade/fleet/fleet_camera.h"
+#include "alidade/fleet/row_order.h"
 #include "alidade/simulate/fleet.h"
 
 namespace alidade {
@@ -18,13 +19,17 @@ namespace alidade {
 /// The n-th row of a simulated camera.
 [[nodiscard]] FleetRow fleet_row_of(const FleetObservation& observation, std::int64_t n);
 
-/// Of cam.ID.state: a function of the camera's messages 1 … n alone.
-[[nodiscard]] std::string fleet_state_text(const std::string& id, const FleetCamera& camera);
+/// Of cam.ID.state: a function of the camera's messages 1 … n alone. Rows that never came are in its sentence, and
+/// `missing` and `restarts` are members of it, where there are any. n = 0: no row has been taken in yet.
+[[nodiscard]] std::string fleet_state_text(const std::string& id, const FleetCamera& camera,
+                                           const FleetNumbers& numbers = {});
 /// Of cam.ID.alarm.
 [[nodiscard]] std::string fleet_alarm_text(const std::string& id, const FleetAlarm& alarm);
 
 /// All of a camera's state as text of one line (base64), and back; none where it is of another version.
 [[nodiscard]] std::string checkpoint_text(const FleetCamera& camera);
 [[nodiscard]] std::optional<FleetCamera> parse_checkpoint(std::string_view text);
+/// n of a state's text; 0: it has none.
+[[nodiscard]] std::int64_t fleet_state_n(std::string_view text);
 
 }  // namespace alidade

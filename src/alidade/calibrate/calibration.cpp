@@ -104,17 +104,45 @@ bool has_a_cause(const Calibration& result) {
   });
 }
 
+/// The scores beside a change over the photos, to first order: what it does not explain.
+std::vector<ViewScore> beside(const LensChange& change, std::vector<ViewScore> scores, const OrderTaken& taken) {
+  for (std::size_t i = 0; i < taken.of_used.size(); ++i) {
+    ViewScore& view = scores[taken.of_used[i]];
+    view.gradient += view.information * (change.size * change.course[i] * change.direction);
+  }
+  return scores;
+}
+
+/// A centre or a focal length that each photo has its own of, where it explains what a proved change does not: of
+/// photos that scatter some order always shows a jump.
+std::optional<PhotoEffect> effect_beside(const LensChangeStudy& change, std::vector<ViewScore> scores,
+                                         const OrderTaken& taken, const Calibration& result) {
+  if (!change.change || !change.change->is_proved || scores.empty() || has_a_cause(result)) return std::nullopt;
+  return photo_effect(beside(*change.change, std::move(scores), taken), result);
+}
+
 /// Names why the photos disagree: two lenses, or a centre or a focal length that each photo has its own of. A change
-/// over the photos goes before, but for one of the focal length where it is the centre that differs.
-void explain_disagreement(std::span<const ViewScore> scores, const LensChangeStudy& change, Calibration& result) {
-  const bool changes = change.change && change.change->is_proved;
+/// over the photos goes before, where it matters.
+void explain_disagreement(std::span<const ViewScore> scores, bool changes, Calibration& result) {
   std::vector<std::string> photos;
   const auto two = changes ? std::nullopt : find_two_lenses(scores, result, photos);
   if (two) return heed_two_lenses(*two, photos, result.verdict);
-  if (has_a_cause(result)) return;
-  const auto effect = photo_effect(scores, result);
-  const bool goes_before = effect && effect->is_centre && changes && change.change->what == LensChange::focal_length;
-  if (effect && (!changes || goes_before)) heed_photo_effect(*effect, result.verdict);
+  if (changes || has_a_cause(result)) return;
+  if (const auto effect = photo_effect(scores, result)) heed_photo_effect(*effect, result.verdict);
+}
+
+/// Why photos disagree, by a change over them or without one.
+void heed_changes(LensChangeStudy change, const std::vector<ViewScore>& scores, const OrderTaken& taken,
+                  Calibration& result) {
+  const std::optional<PhotoEffect> effect = effect_beside(change, scores, taken, result);
+  if (effect) change.change.reset();
+  heed_change(change, taken.photos, result.verdict);
+  if (effect) return heed_photo_effect(*effect, result.verdict);
+  if (result.verdict.state == State::good) return;
+  const bool changes = std::ranges::any_of(result.verdict.checks, [](const Check& check) {
+    return check.name == "same lens" && check.state != State::good;
+  });
+  explain_disagreement(scores, changes, result);
 }
 
 /// The board as solved: decides its shape, and solves again where that is not the one of the first solve.
@@ -190,8 +218,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
-  heed_change(change, taken.photos, result.verdict);
-  if (result.verdict.state != State::good) explain_disagreement(scores, change, result);
+  heed_changes(change, scores, taken, result);
   heed_assumptions(result.assumed, result.verdict);
   return result;
 }

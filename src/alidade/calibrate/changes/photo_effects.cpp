@@ -133,13 +133,15 @@ void heed_photo_effect(const PhotoEffect& effect, Verdict& verdict) {
                          " px, as with an image stabiliser: with one for each photo they agree"
                    : "the focal length differs from photo to photo, by about " + text_of(100.0 * effect.scatter, 2) +
                          " %, in no order, as where an autofocus is on: with one for each photo they agree";
-  verdict.checks.push_back(check);
-  verdict.sentence += "; " + check.text;
-  verdict.to_add = effect.is_centre ? "switch the image stabilisation of lens and camera off and take the photos "
-                                      "again, or expect this of each photo"
-                                    : "switch the autofocus off, fix the focus for the distances at which the camera "
-                                      "is used, and take the photos "
-                                      "again";
+  const std::string remedy =
+      effect.is_centre ? "switch the image stabilisation of lens and camera off and take the photos again, or expect "
+                         "this of each photo"
+                       : "switch the autofocus off, fix the focus for the distances at which the camera is used, and "
+                         "take the photos again";
+  const bool was_good = verdict.state == State::good;
+  heed(check, remedy, verdict);
+  if (!was_good) verdict.sentence += "; " + check.text;
+  verdict.to_add = remedy;
 }
 
 }  // namespace alidade

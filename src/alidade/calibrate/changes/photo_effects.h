@@ -24,7 +24,7 @@ struct PhotoEffect {
 /// they are, where neither explains it, or for fewer than eight photos.
 [[nodiscard]] std::optional<PhotoEffect> photo_effect(std::span<const ViewScore> views, const CalibrateReport& report);
 
-/// Names it in the verdict, whose state stays.
+/// Names it in the verdict, which is of care at best.
 void heed_photo_effect(const PhotoEffect& effect, Verdict& verdict);
 
 }  // namespace alidade

@@ -16,6 +16,7 @@ namespace alidade {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::sample_camera;
 
 /// Views of lenses whose centre and focal length scatter by so much about the example's.
@@ -50,10 +51,19 @@ TEST(PhotoEffects, AStabiliserIsNamed) {
   }
 }
 
+// Of 24 photos that scatter, the order of one set in 24 shows a jump by chance, which was named in its stead.
+TEST(PhotoEffects, AJumpThatTheOrderShowsByChanceIsNotNamed) {
+  constexpr int draw = 12;
+  for (const Calibration& result : {scattered(10.0, 0.0, draw), scattered(0.0, 0.02, draw)}) {
+    EXPECT_NE(found_in(result.verdict), nullptr) << result.verdict.sentence;
+    EXPECT_THAT(result.verdict.sentence, Not(HasSubstr("jumps")));
+    EXPECT_EQ(result.verdict.state, State::care);
+  }
+}
+
 TEST(PhotoEffects, AnAutofocusThatSearchesIsNamed) {
   for (int draw = 0; draw < testing::trials(3); ++draw) {
     const Calibration result = scattered(0.0, 0.02, draw);
-    if (result.verdict.sentence.find("drifts") != std::string::npos) continue;  // in that order by chance
     ASSERT_NE(found_in(result.verdict), nullptr) << result.verdict.sentence;
     EXPECT_THAT(found_in(result.verdict)->text, HasSubstr("the focal length differs from photo to photo"));
     EXPECT_THAT(result.verdict.to_add, HasSubstr("autofocus"));

@@ -82,10 +82,13 @@ NextPhotoPlan plan_next_photos(const Camera& camera, double noise_px, const std:
   const auto inverse = [](const Eigen::MatrixXd& S) { return Llt(S).inverse(); };
   const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * cov * scale.cwiseInverse().asDiagonal();
   Eigen::MatrixXd information = inverse(correlation);
+  std::vector<bool> is_taken(candidates.size());  // two photos of a board that stands still share what the optics do
   for (int photo = 0; photo < num_photos; ++photo) {
     NextPhoto best{{}, std::numeric_limits<double>::infinity()};
     Eigen::MatrixXd best_information;
+    std::size_t best_of = candidates.size();
     for (std::size_t i = 0; i < candidates.size(); ++i) {
+      if (is_taken[i]) continue;
       report_progress(progress, "trying board poses", i, candidates.size());
       const Eigen::MatrixXd with =
           information + scale.asDiagonal() * candidates[i].information * scale.asDiagonal() / (noise_px * noise_px);
@@ -94,8 +97,10 @@ NextPhotoPlan plan_next_photos(const Camera& camera, double noise_px, const std:
       if (worst >= best.worst_3sigma_px) continue;
       best = {candidates[i].cam_from_board, worst};
       best_information = with;
+      best_of = i;
     }
-    if (!std::isfinite(best.worst_3sigma_px)) break;
+    if (best_of == candidates.size() || !std::isfinite(best.worst_3sigma_px)) break;
+    is_taken[best_of] = true;
     plan.photos.push_back(best);
     information = best_information;
   }

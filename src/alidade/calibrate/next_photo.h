@@ -24,8 +24,8 @@ struct NextPhotoPlan {
 
 /// Chooses, out of board poses all over the image, at two distances and five tilts, the one that lowers the worst 3σ
 /// of projection most; then the next, and so on. Greedy experimental design on the information matrix of the lens:
-/// Λ' = Λ + (A − W V⁻¹ Wᵀ)/σ², the candidate's pose eliminated. `camera.cov` and `noise_px` come from the calibration.
-/// Fedorov, "Theory of optimal experiments", 1972 (sequential G-optimal design).
+/// Λ' = Λ + (A − W V⁻¹ Wᵀ)/σ², the candidate's pose eliminated. No pose is proposed twice. `camera.cov` and `noise_px`
+/// come from the calibration. Fedorov, "Theory of optimal experiments", 1972 (sequential G-optimal design).
 [[nodiscard]] NextPhotoPlan plan_next_photos(const Camera& camera, double noise_px,
                                              const std::vector<Eigen::Vector3d>& board_points, int num_photos,
                                              const Progress& progress = {});

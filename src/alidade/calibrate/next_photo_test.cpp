@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "alidade/calibrate/photo_plan.h"
 #include "alidade/testing/calibration_sample.h"
 
 namespace alidade {
@@ -89,6 +90,31 @@ TEST(NextPhoto, WithoutACovarianceThereIsNoPlan) {
   EXPECT_TRUE(plan_next_photos(camera, 0.1, points_in_board(sample_board), 2).photos.empty());
   camera.cov = Eigen::MatrixXd::Identity(10, 10);
   EXPECT_TRUE(plan_next_photos(camera, 0.0, points_in_board(sample_board), 2).photos.empty());
+}
+
+TEST(NextPhoto, PhotosThatDoNotHelpAreOfCare) {
+  const Planned planned = plan("brown", 12, 1, 1);
+  CalibratedNow now{.camera = planned.report.camera,
+                    .board = sample_board,
+                    .board_points = planned.report.board_points,
+                    .noise_px = planned.report.noise_px};
+  EXPECT_EQ(plan_photos(now, {}).verdict.state, State::good);
+  now.camera.cov *= 1e-8;
+  const Verdict verdict = plan_photos(now, {}).verdict;
+  EXPECT_EQ(verdict.state, State::care);
+  EXPECT_NE(verdict.sentence.find("by less than 1 %"), std::string::npos) << verdict.sentence;
+}
+
+// Where a lens is unknown in the corners alone, the same corner was proposed again and again.
+TEST(NextPhoto, ProposesNoPoseTwice) {
+  const Planned planned = plan("brown", 4, 20, 1);
+  ASSERT_EQ(planned.plan.photos.size(), 20u);
+  for (std::size_t i = 0; i < planned.plan.photos.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const Rigid3 &a = planned.plan.photos[i].cam_from_board, &b = planned.plan.photos[j].cam_from_board;
+      EXPECT_GT((a.translation - b.translation).norm() + a.rotation.angularDistance(b.rotation), 1e-3) << i << ' ' << j;
+    }
+  }
 }
 
 TEST(NextPhoto, StopsWhenAsked) {

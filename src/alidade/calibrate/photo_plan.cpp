@@ -32,6 +32,8 @@ Verdict photos_verdict(const PhotoPlan& plan) {
   verdict.sentence =
       fmt::format("{} more photo{} lower the worst 3σ from {:.2g} to {:.2g} px", plan.photos.size(),
                   plan.photos.size() == 1 ? "" : "s", plan.worst_3sigma_px, plan.photos.back().worst_3sigma_px);
+  heed_gain(plan.photos.back().worst_3sigma_px / plan.worst_3sigma_px, "more photos do not help: use this camera",
+            verdict);
   return verdict;
 }
 

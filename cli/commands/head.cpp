@@ -355,6 +355,9 @@ ExitCode run_head(HeadArgs& args, Run& run) {
   check_head(args);
   try {
     return work_head(args, run);
+  } catch (const Interrupted& end) {
+    if (!args.move || std::string_view(end.what()) != Interrupted().what()) throw;
+    throw Interrupted("interrupted; the head is stopped; nothing written");
   } catch (const InputError& error) {  // what fails after Ctrl-C was asked to end
     if (interrupting_signal() == 0) throw;
     throw Interrupted(std::string("interrupted; ") + error.what());

@@ -219,6 +219,14 @@ double csv_number(const std::string& cell, const CsvPlace& place) {
   throw InputError(what + " is not a number");
 }
 
+std::optional<double> finite_number(std::string_view text) {
+  constexpr std::string_view spaces = " \t\r\n";
+  text.remove_prefix(std::min(text.find_first_not_of(spaces), text.size()));
+  text.remove_suffix(text.size() - (text.find_last_not_of(spaces) + 1));
+  const std::optional<double> value = parse_number<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
 SkippedInput skipped_row(const std::string& file, std::string fault) {
   std::size_t line = 0;
   if (fault.starts_with(file + ":")) {

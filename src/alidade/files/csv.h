@@ -24,6 +24,10 @@ struct CsvPlace {
   [[nodiscard]] std::string text() const;
 };
 
+/// The whole of a text as a finite number with a decimal point, 1.5e3; spaces around it and one '+' may be there. None:
+/// it is none.
+[[nodiscard]] std::optional<double> finite_number(std::string_view text);
+
 /// A finite number, |x| ≤ 1e12. Throws `shots.csv:17: column 'range_m': 'nan' is not a finite number`.
 [[nodiscard]] double csv_number(const std::string& cell, const CsvPlace& place);
 

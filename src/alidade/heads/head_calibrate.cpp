@@ -63,6 +63,7 @@ class Session {
   void moves() {
     if (config_.board) {
       find_board_room();
+      move_to(within(at() + 2.0 * degree * Eigen::Vector2d(towards_middle(0), towards_middle(1))));
       for (int i = 0; i < 5; ++i) board_move();
     } else {
       first_moves();
@@ -91,6 +92,9 @@ class Session {
       move_to(within(reach_->home_rad()));
     }
     return left_s() > 0.0;
+  }
+  [[nodiscard]] double towards_middle(int axis) const {
+    return at()[axis] < 0.5 * (head_.low_rad()[axis] + head_.high_rad()[axis]) ? 0.7 : -0.7;
   }
   [[nodiscard]] Eigen::Vector2d within(const Eigen::Vector2d& target) const {
     return target.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());

@@ -50,6 +50,8 @@ class MachineClock final : public HeadClock {
   double begin_s_ = 0.0;
 };
 
+constexpr double margin_rad = 2.0 * degree;  // beyond the limits, where it came to rest or rounds its readings
+
 /// Questions and commands a second, all together: what asks more often changes what it asks about.
 constexpr double max_calls_hz = 40.0;
 
@@ -88,6 +90,8 @@ MovingHead::MovingHead(HeadDevice& device, const Eigen::Vector2d& low_rad, const
     if (!(low_[axis] <= high_[axis]))
       throw InputError(fmt::format("{}: no {} is within both the head's limits and those that were given",
                                    device.name(), axis == 0 ? "pan" : "tilt"));
+  constexpr double no_limit_rad = 1e4;
+  if (high_[0] - low_[0] < no_limit_rad) device.count_pan_near(0.5 * (low_[0] + high_[0]));
 }
 
 MovingHead::~MovingHead() {
@@ -109,8 +113,8 @@ void MovingHead::heed_interrupt() {
 
 /// It began where it was; from there it may go nowhere that it was not sent.
 void MovingHead::heed_limits(const HeadPosition& reading) {
-  constexpr double margin_rad = 2.0 * degree;
   if (!has_moved_) {
+    rests_at_ = reading.pan_tilt_rad;
     reach_low_ = low_.cwiseMin(reading.pan_tilt_rad).array() - margin_rad;
     reach_high_ = high_.cwiseMax(reading.pan_tilt_rad).array() + margin_rad;
     return;
@@ -119,6 +123,21 @@ void MovingHead::heed_limits(const HeadPosition& reading) {
   stop();
   throw InputError(fmt::format("{}: has gone to pan {:.3f}°, tilt {:.3f}°, beyond its limits; stopped", device_.name(),
                                reading.pan_tilt_rad[0] / degree, reading.pan_tilt_rad[1] / degree));
+}
+
+/// From far outside the way in is as long as the head is far: nobody expects that of a first move.
+void MovingHead::heed_start() {
+  if (has_moved_) return;
+  if (!rests_at_) rests_at_ = device_.position().pan_tilt_rad;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double at = (*rests_at_)[axis];
+    if (at > low_[axis] - margin_rad && at < high_[axis] + margin_rad) continue;
+    const char* const name = axis == 0 ? "pan" : "tilt";
+    throw InputError(fmt::format(
+        "{}: stands at {} {:.3f}°, outside of {:g}…{:g}°; nothing was moved: bring it there by other means, "
+        "or give a --{}-range that has it",
+        device_.name(), name, at / degree, low_[axis] / degree, high_[axis] / degree, name));
+  }
 }
 
 void MovingHead::keep_pace() {
@@ -149,6 +168,7 @@ HeadSent MovingHead::send(const Eigen::Vector2d& pan_tilt_rad) {
   if (!HeadLimits{low_, high_, true, ""}.hold(pan_tilt_rad))
     throw InputError(fmt::format("{}: pan {:.3f}°, tilt {:.3f}° is outside the limits; not sent", device_.name(),
                                  pan_tilt_rad[0] / degree, pan_tilt_rad[1] / degree));
+  heed_start();
   has_moved_ = true;
   const HeadSent sent = device_.command(pan_tilt_rad);
   next_question_s_ += 1.0 / max_calls_hz;  // a command asks before
@@ -167,6 +187,7 @@ void MovingHead::stop() {
   if (!has_moved_) return;
   device_.stop();
   has_moved_ = false;
+  rests_at_.reset();
 }
 
 void MovingHead::wait_until(double t_s) {

@@ -61,6 +61,11 @@ class HeadDevice {
   [[nodiscard]] virtual std::optional<double> zoom() { return std::nullopt; }
   virtual void zoom_to(double share);
 
+  /// Where a turn more or less is the same pan: counts it as what is nearest to this.
+  virtual void count_pan_near(double pan_rad) { (void)pan_rad; }
+  /// False: it reports unasked, and nothing can be said of how long it takes to answer.
+  [[nodiscard]] virtual bool answers_questions() const { return true; }
+
   [[nodiscard]] virtual const std::string& name() const = 0;  ///< To begin a message with; without a password.
   [[nodiscard]] virtual HeadClock& clock() = 0;
 };
@@ -85,6 +90,7 @@ class MovingHead {
   MovingHead& operator=(const MovingHead&) = delete;
 
   [[nodiscard]] HeadPosition position();
+  /// Throws InputError, and sends nothing, where the head rests outside of the limits: its way there could be long.
   HeadSent command(const Eigen::Vector2d& pan_tilt_rad);
   /// The same without a pause after the question before it: the pause comes later.
   HeadSent command_at_once(const Eigen::Vector2d& pan_tilt_rad);
@@ -107,11 +113,13 @@ class MovingHead {
   HeadSent send(const Eigen::Vector2d& pan_tilt_rad);
   void heed_interrupt();
   void heed_limits(const HeadPosition& reading);
+  void heed_start();
 
   HeadDevice& device_;
   Eigen::Vector2d low_, high_;
   Eigen::Vector2d reach_low_ = Eigen::Vector2d::Constant(-1e9), reach_high_ = Eigen::Vector2d::Constant(1e9);
   Progress progress_;
+  std::optional<Eigen::Vector2d> rests_at_;  ///< Where it was before it moved.
   double next_question_s_ = 0.0;
   bool has_moved_ = false;
 };

@@ -42,7 +42,7 @@ double largest_rate(const std::vector<HeadPosition>& readings, int axis) {
 
 /// A step inwards of both axes, and back.
 void move_a_little(MovingHead& head, HeadSurvey& survey) {
-  const Eigen::Vector2d start = head.position().pan_tilt_rad;
+  const Eigen::Vector2d start = head.position().pan_tilt_rad.cwiseMax(head.low_rad()).cwiseMin(head.high_rad());
   Eigen::Vector2d away;
   for (int axis = 0; axis < 2; ++axis) {
     const double room_up = head.high_rad()[axis] - start[axis], room_down = start[axis] - head.low_rad()[axis];
@@ -54,7 +54,7 @@ void move_a_little(MovingHead& head, HeadSurvey& survey) {
   constexpr double max_s = 15.0;
   head.command(away);
   wait_for_rest(head, max_s);
-  head.command(start.cwiseMax(head.low_rad()).cwiseMin(head.high_rad()));
+  head.command(start);
   wait_for_rest(head, max_s);
   survey.zoom = try_zoom(head);
   head.stop();
@@ -69,8 +69,10 @@ Verdict verdict_of(const HeadSurvey& survey) {
   Verdict verdict;
   const Eigen::Vector2d low = survey.limits.low_rad / degree, high = survey.limits.high_rad / degree;
   const Eigen::Vector2d at = survey.readings.back().pan_tilt_rad / degree;
-  verdict.sentence = fmt::format("answers in {:.2g} ± {:.1g} ms, is at pan {:.2f}°, tilt {:.2f}°",
-                                 1e3 * survey.latency_s, 1e3 * survey.jitter_s, at[0], at[1]);
+  const std::string answers = survey.answers_questions ? fmt::format("answers in {:.2g} ± {:.1g} ms",
+                                                                     1e3 * survey.latency_s, 1e3 * survey.jitter_s)
+                                                       : "reports its position unasked";
+  verdict.sentence = fmt::format("{}, is at pan {:.2f}°, tilt {:.2f}°", answers, at[0], at[1]);
   if (survey.limits.are_given) {
     verdict.sentence += fmt::format("; pan {:g}…{:g}°, tilt {:g}…{:g}°", low[0], high[0], low[1], high[1]);
     verdict.checks.push_back({.name = "limits", .text = "the head names its limits"});
@@ -159,6 +161,7 @@ HeadPosition wait_for_rest(MovingHead& head, double max_s) {
 HeadSurvey survey_head(HeadDevice& device, bool moves, const HeadRange& range, const Progress& progress) {
   constexpr std::size_t num_readings = 100;
   HeadSurvey survey{.url = device.name(), .limits = device.limits(), .readings = {}, .verdict = {}};
+  survey.answers_questions = device.answers_questions();
   MovingHead head(device, range.low_rad, range.high_rad, progress);
   for (std::size_t i = 0; i < num_readings; ++i) {
     report_progress(progress, "readings", i, num_readings);

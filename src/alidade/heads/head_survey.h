@@ -28,6 +28,7 @@ struct HeadSurvey {
   HeadLimits limits;
   std::vector<HeadPosition> readings;
   double latency_s = 0.0, latency_p99_s = 0.0, jitter_s = 0.0;  ///< Of an answer: median, 99th of 100, its scatter.
+  bool answers_questions = true;  ///< Else it reports unasked, and the three before are of nothing.
   bool has_moved = false;
   /// By a small move: the largest rate, and the smallest change of what is read; 0: it did not move.
   Eigen::Vector2d rate_rad_s = Eigen::Vector2d::Zero(), resolution_rad = Eigen::Vector2d::Zero();

@@ -129,10 +129,12 @@ JobOutcome outcome_of(const HeadSurvey& survey) {
     estimate["low_rad"] = numbers_of(survey.limits.low_rad);
     estimate["high_rad"] = numbers_of(survey.limits.high_rad);
   }
-  estimate["latency_s"] = survey.latency_s;
-  estimate["latency_p99_s"] = survey.latency_p99_s;
-  document.stddev["latency_s"] = survey.jitter_s;
-  estimate["jitter_s"] = survey.jitter_s;
+  if (survey.answers_questions) {
+    estimate["latency_s"] = survey.latency_s;
+    estimate["latency_p99_s"] = survey.latency_p99_s;
+    document.stddev["latency_s"] = survey.jitter_s;
+    estimate["jitter_s"] = survey.jitter_s;
+  }
   if (survey.has_moved) {
     estimate["rate_rad_s"] = numbers_of(survey.rate_rad_s);
     estimate["resolution_rad"] = numbers_of(survey.resolution_rad);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -30,17 +31,26 @@ class IndiMount final : public HeadDevice {
   [[nodiscard]] const std::string& name() const override { return link_.name(); }
   [[nodiscard]] HeadClock& clock() override { return *clock_; }
 
+  [[nodiscard]] bool answers_questions() const override { return false; }
+
   [[nodiscard]] HeadPosition position() override {
     link_.take(0.0);
+    if (link_.behind_s() > behind_s)
+      throw InputError(
+          fmt::format("{}: for {:g} s it says more than can be read: where it is now is not known", name(), behind_s));
     const IndiProperty* coordinates = link_.find(where_it_is);
     if (coordinates == nullptr) throw InputError(name() + ": no longer reports its position");
     if (coordinates->state == "Alert") throw InputError(name() + ": the mount reports a fault (Alert)");
     const Eigen::Vector2d at = angles(*coordinates);
     // While it moves it has to say so; at rest nothing new comes, and the old stays true.
-    const double old_s = clock_->now_s() - coordinates->t_s;
-    if (coordinates->state == "Busy" && old_s > silent_s)
-      throw InputError(fmt::format("{}: moves and has said nothing for {:g} s", name(), silent_s));
+    const double old_s = clock_->now_s() - coordinates->t_s, most_s = longest_silence_s(*coordinates);
+    if (coordinates->state == "Busy" && old_s > most_s)
+      throw InputError(fmt::format("{}: moves and has said nothing for {:.2g} s", name(), most_s));
     return {clock_->now_s(), 0.0, at};
+  }
+  void count_pan_near(double pan_rad) override {
+    last_pan_ = pan_rad;
+    has_last_ = true;
   }
   HeadSent command(const Eigen::Vector2d& target) override {
     if (!limits_.hold(target)) throw InputError(name() + ": a command that is no angle within its limits");
@@ -64,7 +74,21 @@ class IndiMount final : public HeadDevice {
   }
 
  private:
-  static constexpr double silent_s = 2.5, patience_s = 5.0;
+  static constexpr double behind_s = 0.3, patience_s = 5.0;
+
+  /// While it moves: half a second, or three times as long as between its reports where these are rarer; a driver that
+  /// does not take POLLING_PERIOD reports once a second. Before two reports have come nothing is known of that.
+  double longest_silence_s(const IndiProperty& coordinates) {
+    constexpr double least_s = 0.5, most_s = 2.5, times = 3.0;
+    const bool is_busy = coordinates.state == "Busy";
+    if (coordinates.count != count_) {
+      if (is_busy && was_busy_) gap_s_ = std::max(gap_s_, coordinates.t_s - reported_s_);
+      reported_s_ = coordinates.t_s;
+      count_ = coordinates.count;
+      was_busy_ = is_busy;
+    }
+    return gap_s_ > 0.0 ? std::clamp(times * gap_s_, least_s, most_s) : most_s;
+  }
 
   void begin() {
     link_.connect_device(patience_s);
@@ -80,10 +104,12 @@ class IndiMount final : public HeadDevice {
   Eigen::Vector2d angles(const IndiProperty& coordinates) {
     const auto value = [&](const char* member) {
       const auto found = coordinates.values.find(member);
-      return found == coordinates.values.end() ? std::nan("") : sexagesimal(found->second);
+      if (found == coordinates.values.end()) throw InputError(name() + ": reports no position in the sky");
+      const double number = sexagesimal(found->second);
+      if (std::isfinite(number)) return number;
+      throw InputError(fmt::format("{}: '{}' is no {}", name(), found->second.substr(0, 40), member));
     };
     Eigen::Vector2d at(value("RA") * degrees_an_hour * degree, value("DEC") * degree);
-    if (!at.allFinite()) throw InputError(name() + ": reports no position in the sky");
     constexpr double turn = 2.0 * std::numbers::pi;
     if (has_last_) at[0] += turn * std::round((last_pan_ - at[0]) / turn);
     last_pan_ = at[0];
@@ -96,6 +122,9 @@ class IndiMount final : public HeadDevice {
   HeadLimits limits_;
   double last_pan_ = 0.0;
   bool has_last_ = false;
+  double gap_s_ = 0.0, reported_s_ = 0.0;  ///< The longest between two reports while it moved; when the last came.
+  std::size_t count_ = 0;
+  bool was_busy_ = false;
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "alidade/files/csv.h"
 #include "alidade/files/files.h"
 #include "alidade/heads/head_device.h"
 #include "alidade/heads/protocols/soap.h"
@@ -52,7 +53,7 @@ std::size_t end_of_tag(const std::string& text, std::size_t begin) {
 }  // namespace
 
 std::string XmlElements::next() {
-  constexpr std::size_t longest = 1 << 28;
+  constexpr std::size_t longest = 1 << 28, longest_tag = 1 << 16;
   const std::size_t begin = text_.find_first_not_of(" \t\r\n");
   if (begin == std::string::npos) {
     text_.clear();
@@ -60,7 +61,10 @@ std::string XmlElements::next() {
   }
   if (text_[begin] != '<' || text_.size() > longest) throw InputError(where_ + ": what comes is no INDI");
   const std::size_t tag_end = end_of_tag(text_, begin);
-  if (tag_end == std::string::npos) return "";
+  if (tag_end == std::string::npos) {
+    if (text_.size() - begin > longest_tag) throw InputError(where_ + ": what comes is no INDI");
+    return "";
+  }
   std::size_t end = tag_end;
   const bool is_whole = text_[tag_end - 2] == '/' || text_[begin + 1] == '?' || text_[begin + 1] == '!';
   if (!is_whole) {
@@ -80,20 +84,19 @@ std::string XmlElements::next() {
 }
 
 double sexagesimal(const std::string& text) {
-  const char* at = text.c_str();
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
   double sum = 0.0, unit = 1.0;
-  bool is_below_zero = false, has_any = false;
-  for (int part = 0; part < 3; ++part, unit /= 60.0) {
-    char* end = nullptr;
-    const double value = std::strtod(at, &end);
-    if (end == at) break;
-    if (part == 0) is_below_zero = std::signbit(value);
-    sum += std::abs(value) * unit;
-    has_any = true;
-    at = end;
-    while (*at == ':' || *at == ' ') ++at;
+  bool is_below_zero = false;
+  std::size_t at = 0;
+  for (int part = 0; part < 3 && at != std::string::npos; ++part, unit /= 60.0) {
+    const std::size_t end = text.find_first_of(": ", at);
+    const std::optional<double> value = finite_number(text.substr(at, end - at));
+    if (!value || (part > 0 && std::signbit(*value))) return none;
+    if (part == 0) is_below_zero = std::signbit(*value);
+    sum += std::abs(*value) * unit;
+    at = text.find_first_not_of(' ', end == std::string::npos ? end : end + 1);
   }
-  if (!has_any || !std::isfinite(sum)) return std::numeric_limits<double>::quiet_NaN();
+  if (at != std::string::npos) return none;
   return is_below_zero ? -sum : sum;
 }
 
@@ -109,15 +112,25 @@ void IndiLink::connect_again() {
   socket_.close();
   socket_.connect();
   elements_ = XmlElements(name());
+  behind_since_s_.reset();
   socket_.write("<getProperties version=\"1.7\"/>\n");
 }
 
 void IndiLink::take(double wait_s) {
+  constexpr double most_s = 0.1;  // who says more than can be read keeps nobody from stopping the head
+  const std::shared_ptr<HeadClock> clock = machine_clock();
+  const double until_s = clock->now_s() + wait_s + most_s;
   for (std::string text = socket_.some(wait_s); !text.empty(); text = socket_.some(0.0)) {
     elements_.push(text);
     for (std::string element = elements_.next(); !element.empty(); element = elements_.next()) hear(element);
+    if (clock->now_s() < until_s) continue;
+    if (!behind_since_s_) behind_since_s_ = clock->now_s();
+    return;
   }
+  behind_since_s_.reset();
 }
+
+double IndiLink::behind_s() const { return behind_since_s_ ? machine_clock()->now_s() - *behind_since_s_ : 0.0; }
 
 void IndiLink::hear(const std::string& element) {
 #if __has_include(<pugixml.hpp>)
@@ -125,7 +138,9 @@ void IndiLink::hear(const std::string& element) {
   if (!document.load_buffer(element.data(), element.size())) throw InputError(name() + ": what comes is no INDI");
   const pugi::xml_node root = document.document_element();
   const std::string device = root.attribute("device").value(), property = root.attribute("name").value();
-  if (!device.empty() && std::ranges::find(devices_, device) == devices_.end()) devices_.push_back(device);
+  constexpr std::size_t most_devices = 1000;
+  if (!device.empty() && devices_.size() < most_devices && std::ranges::find(devices_, device) == devices_.end())
+    devices_.push_back(device);
   if (device != device_ || property.empty()) return;
   if (std::string_view(root.name()) == "delProperty") {
     properties_.erase(property);

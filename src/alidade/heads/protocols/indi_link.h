@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,8 +40,10 @@ class IndiLink {
   /// indi://HOST:PORT/DEVICE. Throws InputError: nobody answers, built without pugixml.
   IndiLink(const std::string& url, double timeout_s);
 
-  /// Reads what has come; waits so long for the first of it.
+  /// Reads what has come, for a tenth of a second at most; waits so long for the first of it.
   void take(double wait_s);
+  /// For how long there has been more than `take` could read: what is known is that old at least.
+  [[nodiscard]] double behind_s() const;
   /// Until the property is there. Throws InputError: it is not, within so many seconds.
   const IndiProperty& wait_for(const std::string& property, double max_s,
                                const std::function<bool(const IndiProperty&)>& is_so = {});
@@ -64,6 +67,7 @@ class IndiLink {
   XmlElements elements_;
   std::map<std::string, IndiProperty> properties_;
   std::vector<std::string> devices_;
+  std::optional<double> behind_since_s_;
 };
 
 /// Number of "12.5", "-12:30:15" or "12 30 15"; NaN of what is none.

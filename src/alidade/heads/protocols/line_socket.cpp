@@ -14,6 +14,7 @@
 #include <charconv>
 #include <chrono>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -90,6 +91,12 @@ std::string without_password(const std::string& url) {
   return url;
 }
 
+void LineSocket::begin_exchange(double max_s) { exchange_until_s_ = steady_s() + max_s; }
+
+double LineSocket::until_s() const {
+  return std::min(steady_s() + timeout_s_, exchange_until_s_.value_or(std::numeric_limits<double>::infinity()));
+}
+
 void LineSocket::fail(const std::string& what) {
   close();
   throw InputError(address_.name + ": " + what);
@@ -103,7 +110,7 @@ void LineSocket::connect() {
   const int error = ::getaddrinfo(address_.host.c_str(), std::to_string(address_.port).c_str(), &hints, &found);
   if (error != 0) fail(std::string("no such host: ") + ::gai_strerror(error));
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> endpoints(found, &::freeaddrinfo);
-  const double until_s = steady_s() + timeout_s_;
+  const double until_s = this->until_s();
   for (const addrinfo* endpoint = found; endpoint != nullptr && socket_ < 0; endpoint = endpoint->ai_next)
     socket_ = connected(*endpoint, until_s);
   if (socket_ < 0) fail("no answer from that address");
@@ -136,9 +143,9 @@ void LineSocket::close() {
 
 void LineSocket::write(std::string_view text) {
   if (socket_ < 0) fail("not connected");
-  const double until_s = steady_s() + timeout_s_;
+  const double until_s = this->until_s();
   while (!text.empty()) {
-    if (!is_ready(socket_, POLLOUT, until_s)) fail("takes nothing");
+    if (steady_s() > until_s || !is_ready(socket_, POLLOUT, until_s)) fail("takes nothing");
     const ssize_t sent =
         tls_ ? tls_->write(text.data(), text.size()) : ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL);
     if (sent < 0 && (errno == EINTR || errno == EAGAIN)) continue;
@@ -151,7 +158,7 @@ void LineSocket::fill(double until_s) {
   constexpr std::size_t most = 1 << 24;  // of what nobody asked for
   if (socket_ < 0) fail("not connected");
   if (buffer_.size() > most) fail("sends what has no end");
-  if (!can_receive(until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
+  if (steady_s() > until_s || !can_receive(until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
   char chunk[65536];
   const ssize_t got = receive(chunk, sizeof chunk);
   if (got < 0 && (errno == EINTR || errno == EAGAIN)) return;
@@ -160,7 +167,7 @@ void LineSocket::fill(double until_s) {
 }
 
 std::string LineSocket::line() {
-  const double until_s = steady_s() + timeout_s_;
+  const double until_s = this->until_s();
   std::size_t end = 0;
   while ((end = buffer_.find('\n')) == std::string::npos) fill(until_s);
   std::string line = buffer_.substr(0, end);
@@ -170,7 +177,7 @@ std::string LineSocket::line() {
 }
 
 std::string LineSocket::bytes(std::size_t count) {
-  const double until_s = steady_s() + timeout_s_;
+  const double until_s = this->until_s();
   while (buffer_.size() < count) fill(until_s);
   std::string taken = buffer_.substr(0, count);
   buffer_.erase(0, count);
@@ -179,15 +186,15 @@ std::string LineSocket::bytes(std::size_t count) {
 
 std::string LineSocket::some(double wait_s) {
   if (socket_ < 0) fail("not connected");
-  if (buffer_.empty() && can_receive(steady_s() + wait_s)) fill(steady_s() + timeout_s_);
+  if (buffer_.empty() && can_receive(steady_s() + wait_s)) fill(until_s());
   return std::exchange(buffer_, {});
 }
 
 std::string LineSocket::rest() {
   constexpr std::size_t most = 1 << 24;
-  const double until_s = steady_s() + timeout_s_;
+  const double until_s = this->until_s();
   while (buffer_.size() < most) {
-    if (!can_receive(until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
+    if (steady_s() > until_s || !can_receive(until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
     char chunk[65536];
     const ssize_t got = receive(chunk, sizeof chunk);
     if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;

@@ -51,9 +51,13 @@ class LineSocket {
   /// All until the other side closes.
   [[nodiscard]] std::string rest();
   void set_timeout(double timeout_s) { timeout_s_ = timeout_s; }
+  /// From now on all calls together end within so many seconds, until it is called again: who answers a letter at a
+  /// time is not waited for.
+  void begin_exchange(double max_s);
   [[nodiscard]] const SocketAddress& address() const { return address_; }
 
  private:
+  [[nodiscard]] double until_s() const;
   void fill(double until_s);
   void begin_tls(double until_s);
   [[nodiscard]] ssize_t receive(char* bytes, std::size_t count);
@@ -63,6 +67,7 @@ class LineSocket {
 
   SocketAddress address_;
   double timeout_s_;
+  std::optional<double> exchange_until_s_;
   int socket_ = -1;
   std::optional<TlsTrust> trust_;
   std::unique_ptr<TlsSession> tls_;

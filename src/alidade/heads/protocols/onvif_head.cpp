@@ -78,6 +78,14 @@ class OnvifHead final : public HeadDevice {
       throw InputError(fmt::format("{}: has no such profile; it has {}", name(), all.size()));
     profile_ = all[which];
     if (!profile_.has_pan_tilt) throw InputError(name() + ": this profile has no PTZ configuration: it does not turn");
+    if (profile_.counts_degrees && !query_.determines_azimuth) {
+      query_.azimuth_deg = profile_.x;
+      query_.determines_azimuth = true;
+    }
+    if (profile_.counts_degrees && !query_.determines_elevation) {
+      query_.elevation_deg = profile_.y;
+      query_.determines_elevation = true;
+    }
     const Eigen::Vector2d low = angles(profile_.x.high, profile_.y.low), high = angles(profile_.x.low, profile_.y.high);
     limits_ = {low, high, query_.determines_azimuth && query_.determines_elevation, "ONVIF, " + service_.maker()};
     if (!query_.determines_azimuth) limits_.assumed.push_back(supposed("az", query_.azimuth_deg));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "alidade/files/csv.h"
 #include "alidade/files/files.h"
 #include "alidade/heads/protocols/soap.h"
 
@@ -57,16 +58,24 @@ std::string path_of(const std::string& address) {
   return slash == std::string::npos ? "/" : address.substr(slash);
 }
 
-bool read_pair(const pugi::xml_node& node, double& x, double& y) {
-  x = node.attribute("x").as_double(std::nan(""));
-  y = node.attribute("y").as_double(std::nan(""));
-  return node && std::isfinite(x) && std::isfinite(y);
+/// The whole of a text that a camera sent as a number. Throws InputError that quotes anything else.
+double number_of(const std::string& where, const std::string& text, const std::string& what) {
+  if (const auto number = finite_number(text)) return *number;
+  throw InputError(fmt::format("{}: '{}' is no number: {}", where, text.substr(0, 40), what));
 }
 
-void read_range(const pugi::xml_node& node, OnvifRange& range) {
-  const double low = std::strtod(text_in(node, "Min").c_str(), nullptr);
-  const double high = std::strtod(text_in(node, "Max").c_str(), nullptr);
-  if (std::isfinite(low) && std::isfinite(high) && low < high) range = {low, high};
+/// None where there is no such attribute.
+std::optional<double> attribute_of(const std::string& where, const pugi::xml_node& node, const char* attribute) {
+  if (!node.attribute(attribute)) return std::nullopt;
+  return number_of(where, node.attribute(attribute).value(),
+                   fmt::format("{} of {} in its position", attribute, local_name(node)));
+}
+
+void read_range(const std::string& where, const pugi::xml_node& node, OnvifRange& range) {
+  if (!first_named(node, "Min") || !first_named(node, "Max")) return;
+  const double low = number_of(where, text_in(node, "Min"), "Min of its range"),
+               high = number_of(where, text_in(node, "Max"), "Max of its range");
+  if (low < high) range = {low, high};
 }
 
 constexpr const char* device_ns = "http://www.onvif.org/ver10/device/wsdl";
@@ -79,12 +88,14 @@ constexpr const char* schema_ns = "http://www.onvif.org/ver10/schema";
 struct OnvifService::State {
   State(const std::string& url, const HeadOptions& options)
       : password(options.password),
+        max_s(options.timeout_s),
         socket(address_of(url, "onvif://", onvif_trust(url) ? 443 : 80), std::max(options.timeout_s, patience_s)) {
     if (auto trust = onvif_trust(url)) socket.encrypt(std::move(*trust));
   }
 
   static constexpr double patience_s = 1.0;  // a camera computes a digest, and opens a connection for each question
   std::string password;
+  double max_s;
   LineSocket socket;
   double behind_s = 0.0;  ///< The camera's clock, of ours: its digests are good for a few minutes of its own time.
   std::string device_path = "/onvif/device_service", media_path = device_path, ptz_path = device_path;
@@ -95,16 +106,23 @@ struct OnvifService::State {
     UsernameToken token;
     if (names_user) token = username_token(address.user, password, machine_clock()->now_s() + behind_s);
     const std::string body = fmt::format("<{0} xmlns=\"{1}\">{2}</{0}>", command, space, inside);
-    const HttpReply reply = http_post(socket, path, soap_request(token, body));
+    const HttpReply reply = http_post(socket, path, soap_request(token, body), std::max(max_s, patience_s));
     pugi::xml_document document;
-    if (!document.load_buffer(reply.body.data(), reply.body.size())) {
-      const std::string why = reply.status == 401
-                                  ? "refuses the user or the password (HTTP 401)"
-                                  : fmt::format("answers {} with HTTP {} and no XML", command, reply.status);
-      throw InputError(address.name + ": " + why);
-    }
-    if (const pugi::xml_node fault = first_named(document, "Fault")) refuse(fault, command);
+    const bool is_soap =
+        document.load_buffer(reply.body.data(), reply.body.size()) && first_named(document, "Envelope");
+    if (const pugi::xml_node fault = first_named(document, "Fault"); is_soap && fault) refuse(fault, command);
+    if (!is_soap || reply.status < 200 || reply.status > 299) refuse(reply, command);
     return document;
+  }
+
+  [[noreturn]] void refuse(const HttpReply& reply, const std::string& command) const {
+    std::string why = fmt::format("answers {} with HTTP {}", command, reply.status);
+    if (reply.status == 401)
+      why = std::string("refuses the user or the password (HTTP 401") +
+            (reply.asks_for_digest ? "; it asks for HTTP's own Digest, which is not supported)" : ")");
+    else if (reply.status == 200)
+      why += ", and no SOAP";
+    throw InputError(socket.address().name + ": " + why);
   }
 
   [[noreturn]] void refuse(const pugi::xml_node& fault, const std::string& command) const {
@@ -160,8 +178,14 @@ std::vector<OnvifProfile> OnvifService::profiles() {
     profile.has_zoom = static_cast<bool>(first_named(ptz, "ZoomLimits"));
     const pugi::xml_node limits = first_named(ptz, "PanTiltLimits");
     if (limits) {
-      read_range(first_named(limits, "XRange"), profile.x);
-      read_range(first_named(limits, "YRange"), profile.y);
+      const std::string space = text_in(limits, "URI");
+      const std::string usual = text_in(ptz, "DefaultAbsolutePantTiltPositionSpace");  // so ONVIF writes it
+      const auto is_degrees = [](const std::string& uri) { return uri.ends_with("SphericalPositionSpaceDegrees"); };
+      profile.counts_degrees = is_degrees(space) && (usual.empty() || is_degrees(usual));
+      if (is_degrees(space) == profile.counts_degrees) {  // else the limits are of another space than the positions
+        read_range(name(), first_named(limits, "XRange"), profile.x);
+        read_range(name(), first_named(limits, "YRange"), profile.y);
+      }
     }
     found.push_back(std::move(profile));
   }
@@ -174,9 +198,14 @@ OnvifStatus OnvifService::status(const OnvifProfile& profile) {
                   fmt::format("<ProfileToken>{}</ProfileToken>", escaped_xml(profile.token)));
   const pugi::xml_node position = first_named(answer, "Position");
   OnvifStatus status;
-  status.has_pan_tilt = read_pair(first_named(position, "PanTilt"), status.x, status.y);
-  status.zoom = first_named(position, "Zoom").attribute("x").as_double(std::nan(""));
-  status.has_zoom = std::isfinite(status.zoom);
+  const pugi::xml_node pan_tilt = first_named(position, "PanTilt"), zoom = first_named(position, "Zoom");
+  const auto x = attribute_of(name(), pan_tilt, "x"), y = attribute_of(name(), pan_tilt, "y"),
+             zoom_x = attribute_of(name(), zoom, "x");
+  status.has_pan_tilt = x && y;
+  status.x = x.value_or(0.0);
+  status.y = y.value_or(0.0);
+  status.has_zoom = zoom_x.has_value();
+  status.zoom = zoom_x.value_or(0.0);
   return status;
 }
 

@@ -19,6 +19,7 @@ struct OnvifRange {
 struct OnvifProfile {
   std::string token, name, ptz_token;
   OnvifRange x, y;
+  bool counts_degrees = false;  ///< x and y are angles: ONVIF's SphericalPositionSpaceDegrees.
   bool has_pan_tilt = false, has_zoom = false;
 };
 

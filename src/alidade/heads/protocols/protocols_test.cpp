@@ -66,7 +66,10 @@ TEST(Indi, Sexagesimal) {
   EXPECT_DOUBLE_EQ(sexagesimal("12.5"), 12.5);
   EXPECT_DOUBLE_EQ(sexagesimal("-0:30:36"), -0.51);
   EXPECT_DOUBLE_EQ(sexagesimal("21 15 00"), 21.25);
-  EXPECT_TRUE(std::isnan(sexagesimal("north")));
+  EXPECT_DOUBLE_EQ(sexagesimal("12:30"), 12.5);
+  EXPECT_DOUBLE_EQ(sexagesimal("-12: 30: 15.0"), -12.504166666666666);
+  for (const char* none : {"north", "", "12,5", "12.5h", "1:2:3:4", "1:-2:3", "1:x", "nan"})
+    EXPECT_TRUE(std::isnan(sexagesimal(none))) << none;
 }
 
 TEST(OnvifCamera, AnswersFaultsToWhatItDoesNotUnderstand) {

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <optional>
 
+#include "alidade/files/csv.h"
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/heads/protocols/line_socket.h"
@@ -16,7 +17,10 @@ namespace {
 class RotctlHead final : public HeadDevice {
  public:
   RotctlHead(const std::string& url, const HeadOptions& options)
-      : name_(url), clock_(machine_clock()), socket_(address_of(url, "rotctl://", 4533), options.timeout_s) {
+      : name_(url),
+        clock_(machine_clock()),
+        timeout_s_(options.timeout_s),
+        socket_(address_of(url, "rotctl://", 4533), options.timeout_s) {
     socket_.connect();
     read_limits();
   }
@@ -26,6 +30,7 @@ class RotctlHead final : public HeadDevice {
   [[nodiscard]] HeadClock& clock() override { return *clock_; }
 
   [[nodiscard]] HeadPosition position() override {
+    socket_.begin_exchange(timeout_s_);
     socket_.connect();
     const double asked_s = clock_->now_s();
     socket_.write("p\n");
@@ -53,6 +58,7 @@ class RotctlHead final : public HeadDevice {
 
  private:
   HeadSent send(const std::string& line) {
+    socket_.begin_exchange(timeout_s_);
     socket_.connect();
     const double sent_s = clock_->now_s();
     socket_.write(line);
@@ -67,18 +73,18 @@ class RotctlHead final : public HeadDevice {
   }
 
   double angle(const std::string& line) {
-    char* end = nullptr;
-    const double value = std::strtod(line.c_str(), &end);
-    if (!line.empty() && *end == '\0' && std::isfinite(value) && std::abs(value) < 1e6) return value;
+    const std::optional<double> value = finite_number(line);
+    if (value && std::abs(*value) < 1e6) return *value;
     socket_.close();
     throw InputError(name_ + ": '" + line.substr(0, 40) + "' is no angle of a head");
   }
 
   void read_limits() {
+    socket_.begin_exchange(4.0 * timeout_s_);
     socket_.write("\\dump_state\n");
     std::optional<double> min_az, max_az, min_el, max_el;
-    const auto take = [](const std::string& line, const char* key, std::optional<double>& value) {
-      if (line.starts_with(key)) value = std::strtod(line.c_str() + std::string_view(key).size(), nullptr);
+    const auto take = [&](const std::string& line, const char* key, std::optional<double>& value) {
+      if (line.starts_with(key)) value = angle(line.substr(std::string_view(key).size()));
     };
     for (int i = 0; i < 100; ++i) {
       std::string line;
@@ -95,8 +101,7 @@ class RotctlHead final : public HeadDevice {
       if (line == "done" || line.starts_with("RPRT")) break;
     }
     limits_.info = "rotctld";
-    const bool is_given = min_az && max_az && min_el && max_el && *min_az < *max_az && *min_el < *max_el;
-    if (!is_given || !std::isfinite(*max_az - *min_az + *max_el - *min_el)) return;
+    if (!min_az || !max_az || !min_el || !max_el || !(*min_az < *max_az && *min_el < *max_el)) return;
     limits_.are_given = true;
     limits_.low_rad = Eigen::Vector2d(-*max_az, *min_el) * degree;
     limits_.high_rad = Eigen::Vector2d(-*min_az, *max_el) * degree;
@@ -104,6 +109,7 @@ class RotctlHead final : public HeadDevice {
 
   std::string name_;
   std::shared_ptr<HeadClock> clock_;
+  double timeout_s_;
   LineSocket socket_;
   HeadLimits limits_;
 };

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <boost/uuid/detail/sha1.hpp>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -39,12 +40,24 @@ bool begins_with_word(const std::string& line, std::string_view word) {
          });
 }
 
+constexpr std::size_t max_bytes = 1 << 24;  // of an answer
+
+/// All of the text, of HTTP's header.
+std::size_t whole_size(const LineSocket& socket, std::string_view text, int base) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  std::size_t size = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), size, base);
+  if (error == std::errc{} && end == text.data() + text.size() && size <= max_bytes) return size;
+  throw InputError(fmt::format("{}: sends '{}' bytes", socket.address().name, text.substr(0, 40)));
+}
+
 std::string chunked_body(LineSocket& socket) {
-  constexpr std::size_t max_bytes = 1 << 24;
   std::string body;
   for (;;) {
-    const std::size_t size = std::strtoul(socket.line().c_str(), nullptr, 16);
-    if (size == 0 || size > max_bytes || body.size() > max_bytes) return body;
+    const std::string line = socket.line();
+    const std::size_t size = whole_size(socket, line.substr(0, line.find(';')), 16);
+    if (size == 0) return body;
+    if (body.size() + size > max_bytes) throw InputError(socket.address().name + ": sends what has no end");
     body += socket.bytes(size);
     (void)socket.line();
   }
@@ -149,10 +162,10 @@ std::string soap_request(const UsernameToken& token, std::string_view body) {
       header, body);
 }
 
-HttpReply http_post(LineSocket& socket, const std::string& path, std::string_view body) {
-  constexpr std::size_t max_bytes = 1 << 24;
+HttpReply http_post(LineSocket& socket, const std::string& path, std::string_view body, double max_s) {
   constexpr int max_lines = 200;
   socket.close();
+  socket.begin_exchange(max_s);
   socket.connect();
   const SocketAddress& address = socket.address();
   socket.write(
@@ -167,10 +180,10 @@ HttpReply http_post(LineSocket& socket, const std::string& path, std::string_vie
   bool is_chunked = false;
   std::string line = socket.line();
   for (int i = 0; !line.empty() && i < max_lines; ++i, line = socket.line()) {
-    if (begins_with_word(line, "content-length:")) length = std::strtoul(line.c_str() + 15, nullptr, 10);
+    if (begins_with_word(line, "content-length:")) length = whole_size(socket, std::string_view(line).substr(15), 10);
     if (begins_with_word(line, "transfer-encoding:")) is_chunked = line.find("chunked") != std::string::npos;
+    if (begins_with_word(line, "www-authenticate: digest")) reply.asks_for_digest = true;
   }
-  if (length && *length > max_bytes) throw InputError(address.name + ": sends what has no end");
   reply.body = is_chunked ? chunked_body(socket) : length ? socket.bytes(*length) : socket.rest();
   socket.close();
   return reply;

@@ -32,10 +32,11 @@ struct UsernameToken {
 
 struct HttpReply {
   int status = 0;
+  bool asks_for_digest = false;  ///< By HTTP's own authentication (WWW-Authenticate: Digest).
   std::string body;
 };
 /// Asks and reads the answer, whether it says its length, comes in chunks or ends with the connection; the socket is
-/// closed then. Throws InputError: nobody answers, no HTTP.
-[[nodiscard]] HttpReply http_post(LineSocket& socket, const std::string& path, std::string_view body);
+/// closed then. Throws InputError: no whole answer within so many seconds, no HTTP, an answer without end.
+[[nodiscard]] HttpReply http_post(LineSocket& socket, const std::string& path, std::string_view body, double max_s);
 
 }  // namespace alidade

@@ -12,6 +12,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/heads/calibration/board_reach.h"
 #include "alidade/heads/calibration/calibration_log.h"
+#include "alidade/heads/calibration/calibration_verdict.h"
 #include "alidade/heads/calibration/head_shots.h"
 #include "alidade/heads/streams/frame_follower.h"
 #include "alidade/heads/turn_log.h"
@@ -42,6 +43,7 @@ class Session {
     begin_s_ = last_frame_s_ = head_.now_s();
     try {
       watch(0.6);
+      heed_slow_answers();
       moves();
       head_.stop();
     } catch (const InputError& fault) {  // a link is lost: the head first, then what was measured before is kept
@@ -76,6 +78,16 @@ class Session {
     }
   }
 
+  /// Said before it moves: each rest lasts for a few answers.
+  void heed_slow_answers() {
+    constexpr double fewest_moves = 8.0, way_s = 0.5;
+    const double move_s = way_s + rest_s() + answer_s(), moves = (config_.max_s - 4.0) / move_s;
+    if (moves >= fewest_moves || rest_s() < 2.0 * least_rest_s) return;
+    throw InputError(
+        fmt::format("{}: answers take {:.2g} s, so that a move and its rest take {:.2g} s: {:.0f} s are too "
+                    "few; nothing was moved; give --most {:.0f}",
+                    head_.device().name(), answer_s(), move_s, config_.max_s, std::ceil(fewest_moves * move_s + 5.0)));
+  }
   void find_board_room() {
     const std::vector<SeenFrame> seen = follower_.seen();
     if (seen.empty() || seen.back().points.empty())
@@ -102,10 +114,15 @@ class Session {
   /// Who asked and who answered do not agree better on when than the answer took.
   [[nodiscard]] double clock_sigma() const {
     constexpr double machine_s = 1e-4;
+    return std::hypot(machine_s, answer_s() / std::sqrt(12.0));
+  }
+  [[nodiscard]] double answer_s() const {
     std::vector<double> waits;
     for (const HeadPosition& each : readings_) waits.push_back(each.wait_s);
-    return std::hypot(machine_s, waits.empty() ? 0.0 : median_of(std::move(waits)) / std::sqrt(12.0));
+    return waits.empty() ? 0.0 : median_of(std::move(waits));
   }
+  /// Long enough for frames between two answers that are known to be of it.
+  [[nodiscard]] double rest_s() const { return least_rest_s + 2.0 * answer_s(); }
   void stop_anyhow() {
     try {
       head_.stop();
@@ -146,7 +163,7 @@ class Session {
 
   /// There, no faster than points can be followed, and a short rest.
   void move_to(const Eigen::Vector2d& target) {
-    constexpr double rest_s = 0.45, max_s = 20.0;
+    constexpr double max_s = 20.0;
     if (left_s() < 0.0) return;
     while (head_.now_s() - last_frame_s_ > silent_s) watch(0.1);
     ++result_.num_moves;
@@ -159,7 +176,7 @@ class Session {
     const double begin = head_.now_s();
     double still_since = begin;
     Eigen::Vector2d before = at();
-    while (head_.now_s() - begin < max_s && head_.now_s() - std::max(still_since, begin + 0.3) < rest_s) {
+    while (head_.now_s() - begin < max_s && head_.now_s() - std::max(still_since, begin + 0.3) < rest_s()) {
       watch(0.08);
       note_rate();
       if (at() != before) still_since = head_.now_s();
@@ -206,7 +223,10 @@ class Session {
 
   void estimate() {
     const double begin_s = head_.now_s();
-    result_.log_csv = log_of(follower_.seen());
+    const std::vector<SeenFrame> seen = follower_.seen();
+    result_.answer_s = answer_s();
+    result_.has_seen_points = std::ranges::any_of(seen, [](const SeenFrame& each) { return !each.points.empty(); });
+    result_.log_csv = log_of(seen);
     result_.report = observed(result_);
     for (const ObservedQuantity& each : result_.report.quantities) {
       if (each.name == "delay_s") late_s_ = std::clamp(-each.value, -1.0, 1.0);
@@ -281,7 +301,7 @@ class Session {
     return high;
   }
 
-  static constexpr double piece_s = 0.1, silent_s = 1.2;
+  static constexpr double piece_s = 0.1, silent_s = 1.2, least_rest_s = 0.45;
   MovingHead& head_;
   FrameStream& stream_;
   const HeadCalibrationConfig& config_;
@@ -295,83 +315,6 @@ class Session {
          focal_px_ = 0.0;
   std::size_t num_corners_ = 0;
 };
-
-/// Frames whose time stamps were of no use: said, and what was taken instead.
-void heed_stamps(const HeadCalibration& result, Verdict& verdict) {
-  if (result.num_jumps == 0) return;
-  Check check{.name = "time stamps",
-              .state = State::care,
-              .text = fmt::format(
-                  "the stream's time stamps jump ({} times, by up to {:.2g} s); what lies between was put together by "
-                  "when frames came",
-                  result.num_jumps, result.largest_jump_s),
-              .value = result.largest_jump_s,
-              .unit = "s"};
-  verdict.sentence += "; " + check.text;
-  verdict.checks.push_back(std::move(check));
-  if (verdict.state == State::good) verdict.state = State::care;
-}
-
-/// `observe` cannot know whether a camera is rotated about its view or a log's axes are exchanged; of a head the axes
-/// are known.
-void heed_turned_camera(const HeadCalibration& result, Verdict& verdict) {
-  constexpr double mostly = 0.95;
-  Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();
-  for (const ObservedQuantity& each : result.report.quantities)
-    for (int i = 0; i < 3; ++i)
-      if (each.name == fmt::format("mount_{}_rad", "xyz"[i])) mount_rad[i] = each.value;
-  if (std::abs(mount_rad.z()) < mostly * mount_rad.norm()) return;
-  const auto is_bad = [](const Check& check) { return check.state == State::bad; };
-  const auto rotation = std::ranges::find(verdict.checks, "rotation", &Check::name);
-  if (std::ranges::count_if(verdict.checks, is_bad) != 1 || rotation == verdict.checks.end() || !is_bad(*rotation))
-    return;
-  if (!result.report.verdict.to_add.empty() && rotation->text.starts_with("the pixels fit better")) return;
-  rotation->state = State::care;
-  rotation->text = fmt::format("the camera is turned by {:.1f}° about its view", mount_rad.z() / degree);
-  verdict.state = State::care;
-  verdict.exit_code = ExitCode::ok;
-  verdict.to_add.clear();
-}
-
-/// Which focal length is not known as well as was asked, and why not.
-Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibrationConfig& config,
-                            const Eigen::Vector2d& span_rad) {
-  constexpr double held_rad = 0.5 * degree;
-  Verdict verdict = result.report.verdict;
-  if (!result.fault.empty()) {
-    verdict.state = State::refused;
-    verdict.exit_code = ExitCode::undetermined;
-    verdict.sentence = fmt::format("{}; the head was stopped after {:.0f} s; until then: {}", result.fault,
-                                   result.head_time_s, verdict.sentence);
-    verdict.to_add = "mend the link and run it again";
-    return verdict;
-  }
-  heed_turned_camera(result, verdict);
-  const bool has_answer = verdict.exit_code == ExitCode::ok || verdict.exit_code == ExitCode::not_trusted;
-  std::string missing;
-  for (std::size_t i = 0; i < 2 && has_answer && config.until; ++i) {
-    const ObservedQuantity& f = result.report.quantities[i];
-    if (3.0 * f.sigma < *config.until * f.value) continue;
-    missing +=
-        (missing.empty() ? "" : " and ") + f.name +
-        fmt::format(" is known to {:.2g} % (3σ), not to {:.2g} %", 300.0 * f.sigma / f.value, 100.0 * *config.until);
-  }
-  const bool holds_pan = span_rad[0] < held_rad, holds_tilt = span_rad[1] < held_rad;
-  if (!has_answer && (holds_pan || holds_tilt)) {
-    verdict.sentence = fmt::format("{} cannot be determined: {} is fixed; {}", holds_tilt ? "fy" : "fx",
-                                   holds_tilt ? "tilt" : "pan", verdict.sentence);
-    verdict.to_add = fmt::format("give --{}-range more room", holds_tilt ? "tilt" : "pan");
-  }
-  heed_stamps(result, verdict);
-  if (missing.empty()) return verdict;
-  verdict.state = State::refused;
-  verdict.exit_code = ExitCode::undetermined;
-  verdict.sentence = missing + fmt::format(" within the limits, in {:.0f} s", result.head_time_s);
-  verdict.to_add = holds_tilt  ? "give --tilt-range more room"
-                   : holds_pan ? "give --pan-range more room"
-                               : "give more room, or more time: --most SECONDS";
-  return verdict;
-}
 
 }  // namespace
 

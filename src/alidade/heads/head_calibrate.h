@@ -40,6 +40,8 @@ struct HeadCalibration {
   double head_time_s = 0.0;
   double sigma_clock_s =
       0.0;  ///< Of the head's times against the frames'; in σ of the delay beside what the log determines.
+  double answer_s = 0.0;         ///< What the head's answers take: the median.
+  bool has_seen_points = false;  ///< In some frame, whether or not the head's angle is known for it.
   double sigma_angle_rad = 0.0;  ///< Noise of the readings (rounding, too) that is estimated with the rest; 0: none.
   bool is_of_shots = false;      ///< Single images while the head stood; else of a video.
   double narrow_focal_px = 0.0;  ///< Above zero: the field is so narrow that only one focal length is determined.

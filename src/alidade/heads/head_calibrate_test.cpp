@@ -128,6 +128,36 @@ TEST(HeadCalibrate, NamesFyWhereTiltIsFixed) {
   EXPECT_NE(result.verdict.sentence.find("fy"), std::string::npos) << result.verdict.sentence;
 }
 
+/// Readings of a head that stands for a second, moves evenly for two and stands; the answers take `wait_s`.
+std::vector<HeadPosition> slow_readings(double wait_s, double jitter_s) {
+  std::vector<HeadPosition> readings;
+  double t = 0.0;
+  for (int i = 0; t < 4.0; ++i) {
+    const double wait = wait_s + (i % 3 == 0 ? jitter_s : 0.0), sampled_s = t + wait;  // at the end of its wait
+    readings.push_back({t + 0.5 * wait, wait, Eigen::Vector2d(0.1 * std::clamp(sampled_s - 1.0, 0.0, 2.0), 0.0)});
+    t += wait + 0.035;
+  }
+  return readings;
+}
+
+TEST(HeadCalibrate, SlowAnswersAreKnownAtRestAndWhereTheyAreAlike) {
+  for (const double wait_s : {0.06, 0.15}) {
+    const std::vector<HeadPosition> alike = slow_readings(wait_s, 0.0), not_alike = slow_readings(wait_s, 0.05);
+    for (const std::vector<HeadPosition>& readings : {alike, not_alike}) {
+      const HeadManner manner = manner_of(readings);
+      const auto rest = even_motion(readings, manner, 0.5, 0.5, 0.5);
+      ASSERT_TRUE(rest) << wait_s;
+      EXPECT_TRUE(rest->rate_rad_s.isZero());
+      for (const double t_s : {0.9, 1.0, 1.05, 2.95, 3.0, 3.04})
+        EXPECT_FALSE(even_motion(readings, manner, t_s, t_s, t_s));
+    }
+    const auto moving = even_motion(alike, manner_of(alike), 2.0, 2.0, 2.0);
+    ASSERT_TRUE(moving) << wait_s;
+    EXPECT_NEAR(moving->pan_tilt_rad[0], 0.1 * (1.0 + 0.5 * wait_s), 1e-6);  // what all have in common is a delay
+    EXPECT_FALSE(even_motion(not_alike, manner_of(not_alike), 2.0, 2.0, 2.0));
+  }
+}
+
 TEST(HeadCalibrate, EvenMotionOnly) {
   std::vector<HeadPosition> readings;
   for (int i = 0; i < 100; ++i) {  // stands, moves evenly from 1 s to 3 s, stands

@@ -4,12 +4,36 @@
 #include <cmath>
 #include <map>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
 
 namespace alidade {
 namespace {
 
 constexpr double margin_s = 0.08;  // around what is used: a corner beside it curves the line
+constexpr double still_rad = 1e-9;
+
+/// The readings that end before and begin after that time, and all between; empty where there are none.
+std::span<const HeadPosition> readings_around(std::span<const HeadPosition> readings, double from_s, double until_s) {
+  const auto answered_s = [](const HeadPosition& each) { return each.t_s + 0.5 * each.wait_s; };
+  const auto asked_s = [](const HeadPosition& each) { return each.t_s - 0.5 * each.wait_s; };
+  const auto begin = std::ranges::upper_bound(readings, from_s, {}, answered_s);
+  const auto end = std::ranges::lower_bound(readings, until_s, {}, asked_s);
+  if (begin == readings.begin() || end == readings.end()) return {};
+  return {begin - 1, end + 1};
+}
+
+/// Where it stands: all readings around are the same, and none is too far from the next to say so.
+std::optional<HeadLine> at_rest(std::span<const HeadPosition> readings, double from_s, double until_s) {
+  constexpr double longest_gap_s = 2.5;
+  const std::span<const HeadPosition> near = readings_around(readings, from_s - margin_s, until_s + margin_s);
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    if ((near[i].pan_tilt_rad - near.front().pan_tilt_rad).cwiseAbs().maxCoeff() >= still_rad) return std::nullopt;
+    if (i > 0 && near[i].t_s - near[i - 1].t_s > longest_gap_s) return std::nullopt;
+  }
+  if (near.empty()) return std::nullopt;
+  return HeadLine{near.front().pan_tilt_rad, Eigen::Vector2d::Zero()};
+}
 
 /// Of one axis, least squares.
 struct Line {
@@ -64,6 +88,9 @@ std::map<int, std::size_t> columns_of(std::span<const SeenFrame> frames) {
 HeadManner manner_of(std::span<const HeadPosition> readings) {
   constexpr double same_rad = 1e-9, min_s = 0.1;
   HeadManner manner;
+  std::vector<double> gaps_s;
+  for (std::size_t i = 1; i < readings.size(); ++i) gaps_s.push_back(readings[i].t_s - readings[i - 1].t_s);
+  if (!gaps_s.empty()) manner.period_s = median_of(std::move(gaps_s));
   for (int axis = 0; axis < 2; ++axis) {
     for (std::size_t i = 1, from = 0; i < readings.size(); ++i) {
       const double apart = std::abs(readings[i].pan_tilt_rad[axis] - readings[i - 1].pan_tilt_rad[axis]);
@@ -82,14 +109,16 @@ HeadManner manner_of(std::span<const HeadPosition> readings) {
 std::optional<HeadLine> even_motion(std::span<const HeadPosition> readings, const HeadManner& manner, double t_s,
                                     double from_s, double until_s) {
   constexpr std::ptrdiff_t least = 4;
-  constexpr double still_rad = 1e-9, worst_wait_s = 0.02, clock_s = 3e-4, slow = 0.25;
-  const auto begin = std::ranges::lower_bound(readings, from_s - margin_s, {}, &HeadPosition::t_s);
-  const auto end = std::ranges::upper_bound(readings, until_s + margin_s, {}, &HeadPosition::t_s);
+  constexpr double most_apart_s = 0.02, clock_s = 3e-4, slow = 0.25;
+  if (const std::optional<HeadLine> rest = at_rest(readings, from_s, until_s)) return rest;
+  const double around_s = std::max(margin_s, 0.5 * least * manner.period_s);
+  const auto begin = std::ranges::lower_bound(readings, from_s - around_s, {}, &HeadPosition::t_s);
+  const auto end = std::ranges::upper_bound(readings, until_s + around_s, {}, &HeadPosition::t_s);
   if (begin == readings.begin() || end == readings.end() || end - begin < least) return std::nullopt;
   // One more on each side: what begins between two readings shows in the next.
   const std::span<const HeadPosition> near(begin - 1, end + 1);
-  if (std::ranges::any_of(near, [](const HeadPosition& each) { return each.wait_s > worst_wait_s; }))
-    return std::nullopt;
+  const auto [quickest, slowest] = std::ranges::minmax_element(near, {}, &HeadPosition::wait_s);
+  if (slowest->wait_s - quickest->wait_s > most_apart_s) return std::nullopt;
   HeadLine result;
   for (int axis = 0; axis < 2; ++axis) {
     const Line line = line_through(near, axis, t_s);

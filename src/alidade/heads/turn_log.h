@@ -24,14 +24,17 @@ struct HeadLine {
   Eigen::Vector2d pan_tilt_rad, rate_rad_s;
 };
 
-/// How a head was seen to move: the smallest change of what it reads, and its largest rate.
+/// How a head was seen to move: the smallest change of what it reads, its largest rate, and how often it was read.
 struct HeadManner {
+  double period_s = 0.0;  ///< Between readings: the median.
   Eigen::Vector2d step_rad = Eigen::Vector2d::Zero(), fastest_rad_s = Eigen::Vector2d::Zero();
 };
 [[nodiscard]] HeadManner manner_of(std::span<const HeadPosition> readings);
 
 /// Pan and tilt at a time, where the head moves evenly (or stands) from a little before `from_s` to a little after
-/// `until_s`: the line through what was read. None: it starts, stops or turns there.
+/// `until_s`: the line through what was read. None: it starts, stops or turns there, or how long its answers took
+/// leaves that open: each reading is of some instant between question and answer. Where it stands answers may be slow;
+/// where it moves all have to be as slow as each other, and what they have in common is in the delay.
 [[nodiscard]] std::optional<HeadLine> even_motion(std::span<const HeadPosition> readings, const HeadManner& manner,
                                                   double t_s, double from_s, double until_s);
 

@@ -46,8 +46,15 @@ ObserveReport observed(const HeadCalibration& result) {
     ObserveReport report;
     report.verdict.state = State::refused;
     report.verdict.exit_code = ExitCode::undetermined;
-    report.verdict.sentence = std::string("no point was followed while the head moved evenly: ") + error.what();
-    report.verdict.to_add = "let the camera see corners or texture, sharply";
+    const bool has_points = result.has_seen_points;
+    report.verdict.sentence =
+        has_points ? fmt::format(
+                         "points were followed, but never where the head is known to stand or to move evenly; "
+                         "its answers take {:.2g} ms",
+                         1e3 * result.answer_s)
+                   : std::string("no point was followed while the head moved evenly: ") + error.what();
+    report.verdict.to_add = has_points ? "look whether its readings are those of its position, and answer sooner"
+                                       : "let the camera see corners or texture, sharply";
     return report;
   }
 }

@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
        {1.0},
        [](RigTrialSetup& s, double) {
          for (const RigHead& head : xiahou_rig()) s.scene.nominal.push_back(head);
-         s.scene.nominal[1].camera = mistaken_camera(s.scene.nominal[1].camera, 0.15, 0.0);
+         s.scene.nominal[1].camera = mistaken_camera(s.scene.nominal[1].camera, {.focal = 0.15});
          s.mistake.swap_heads = true;
        }},
       {"rows shifted", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.shift_rows = true; }},

@@ -107,7 +107,7 @@ ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   if (args.photos) add_photos(args, scene, simulated.shots, run);
   run.add_file("shots.csv", table_of(args, simulated.shots));
   if (!args.photos) run.add_file("corners.csv", corners_csv(views));
-  const Camera given = mistaken_camera(scene.camera, args.mistake.focal, args.mistake.centre_px, args.mistake.k1);
+  const Camera given = mistaken_camera(scene.camera, args.mistake);
   run.add_file("camera.yaml", camera_text(given, CameraFormat::alidade));
   run.add_file("truth_rangefinder.yaml", beam_text(scene.beam, scene.camera, "camera.yaml"));
   JsonValue outliers = JsonValue::list();
@@ -129,6 +129,7 @@ void add_mistakes(CLI::App& command, SimulateRangefinderArgs& args) {
              -0.5, 0.5);
   add_number(command, "--centre-error", args.mistake.centre_px, "Error of its centre in u and v [px]", -1e3, 1e3);
   add_number(command, "--k1-error", args.mistake.k1, "What its k1 is too large by", -1.0, 1.0);
+  add_number(command, "--p1-error", args.mistake.p1, "What its p1 is too large by", -0.1, 0.1);
   add_number(command, "--drift-m", args.mistake.drift_m,
              "What the readings drift by from the first shot to the last [m]", -1.0, 1.0);
   add_number(command, "--bend-m", args.mistake.bend_m, "Curvature of the readings: too long by this 1 m from 2 m [m]",
@@ -139,6 +140,10 @@ void add_mistakes(CLI::App& command, SimulateRangefinderArgs& args) {
              "Bow of the board along its rows: of its centre over its left and right border [m]", -0.1, 0.1);
   add_number(command, "--twist-m", args.noise.twist_m, "Twist of the board: of its corners out of its plane [m]", -0.1,
              0.1);
+  add_number(command, "--incidence-m", args.noise.incidence_m,
+             "What a reading at 45° is too long by, growing with the tangent of the angle of incidence [m]", -1.0, 1.0);
+  add_number(command, "--sheet-m", args.noise.sheet_m, "What the beam hits lies before the plane of the corners by [m]",
+             -0.1, 0.1);
   command.add_flag("--exchange-uv", args.mistake.exchange_uv, "u and v of the spots are exchanged");
   command.add_option("--unit", args.unit, "Of the readings in the table")
       ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))

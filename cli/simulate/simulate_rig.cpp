@@ -95,7 +95,8 @@ ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   std::vector<std::string> camera_files;
   for (const RigHead& rig_head : scene.rig.heads) {
     camera_files.push_back(fmt::format("camera_{}.yaml", rig_head.head.id));
-    const Camera given = mistaken_camera(rig_head.camera, args.mistake.focal, args.mistake.centre_px);
+    const Camera given =
+        mistaken_camera(rig_head.camera, {.focal = args.mistake.focal, .centre_px = args.mistake.centre_px});
     run.add_file(camera_files.back(), camera_text(with_sigma(given), CameraFormat::alidade));
   }
   // Where the files of the lenses are wrong, the truth has its own.

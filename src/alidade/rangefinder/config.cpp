@@ -29,6 +29,12 @@ FieldList sigma_fields(RangefinderConfig& config) {
            .value = &config.sigma_square_m,
            .help = "σ of the length of the board's squares [m]; 0: exact",
            .limits = share},
+          {.name = "sigma_flat_m",
+           .value = &config.sigma_flat_m,
+           .help = "σ of how far the surface that the beam meets lies off the plane of the board's corners, as of a "
+                   "sheet before the print [m]; 0: exact (default: nothing is counted but what the shots show of it)",
+           .limits = share,
+           .option = "--sigma-flat"},
           {.name = "sigma_scale",
            .value = &config.sigma_scale,
            .help = "σ of the scale of the readings, which is then fixed at 1; 0: exact (default: estimated where it "

@@ -41,6 +41,7 @@ struct RangefinderConfig {
   std::optional<double> sigma_corner_px = {};  ///< Given: replaces the corners' own covariances.
   /// σ of what is given of lengths: carried into the beam's covariance. 0: exact. None: nothing is known.
   std::optional<double> sigma_square_m = {};  ///< Of the length of the board's squares.
+  std::optional<double> sigma_flat_m = {};    ///< Of the surface that the beam meets, off the plane of the corners.
   std::optional<double> sigma_scale = {};     ///< Of the scale of the readings, where that is not estimated.
   bool reject_outliers = true;
   double outlier_sigmas = 6.0;

@@ -180,13 +180,34 @@ void carry_surprise(RangefinderReport& report) {
 /// What the shots half ask for, and what they say of a length that was given: the answer may be off by as much.
 void carry_asked(RangefinderReport& report) {
   constexpr double hardly = 2.0;
-  for (const ShotCause& cause : report.causes)
-    if (cause.sigmas > hardly) report.beam.cov += cause.moves * cause.moves.transpose();
+  constexpr double proved = 3.5, ordinary_m = 0.003;  // chance shows few shots sizes that no board has
+  for (const ShotCause& cause : report.causes) {
+    if (!(cause.sigmas > hardly)) continue;
+    const bool may_be_chance = cause.sigmas < proved && (cause.name == "incidence" || cause.name == "sheet");
+    const double share = may_be_chance ? std::min(1.0, ordinary_m / cause.size) : 1.0;
+    report.beam.cov += share * share * cause.moves * cause.moves.transpose();
+  }
   for (const FixedQuantity& thing : report.fixed) {
     if (thing.name != "scale" || !thing.sigma) continue;
     const double beyond = std::hypot(*thing.sigma, thing.asked_sigma), z = std::abs(thing.asked) / beyond;
     if (z > hardly) report.beam.cov += thing.asked * thing.asked * thing.moves * thing.moves.transpose();
   }
+}
+
+/// A scale that is there by need and half proved may be none: then what is off is the lens or the board.
+void carry_scale(RangefinderReport& report) {
+  constexpr double hardly = 2.0, proved = 4.0;
+  double& variance = report.beam.cov(beam_scale_param, beam_scale_param);
+  if (!report.scale_by_need || !(variance > 0.0)) return;
+  const double away = report.beam.scale - 1.0;
+  report.scale_in_sigmas = away / std::sqrt(variance);
+  const double z = std::abs(report.scale_in_sigmas);
+  if (z > hardly && z < proved) variance += away * away;
+}
+
+/// What was told of the surface that the beam meets, as far as the shots leave it open.
+void carry_told_sheet(RangefinderReport& report) {
+  for (const ShotCause& cause : report.causes) report.beam.cov += cause.left_open * cause.left_open.transpose();
 }
 
 /// The inverse of an information whose diagonal spans many powers of ten.
@@ -303,12 +324,14 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
   if (!part.inverse.allFinite()) return;
   put_clusters(problem, system, part, prior, report);
   report.fixed = fixed_quantities(system, part, prior, camera, problem.points_in_board, report, config);
-  report.causes = error_causes(problem, system, part, prior, report);
+  report.causes = error_causes(problem, system, part, prior, report, config);
   for (FixedQuantity& sigma : fixed_sigmas(problem, report)) report.fixed.push_back(std::move(sigma));
   if (config.refine == Refine::beam) carry_lens(problem, camera, report);
   carry_given(report);
   if (config.refine == Refine::all) carry_surprise(report);
   carry_asked(report);
+  carry_scale(report);
+  carry_told_sheet(report);
 }
 
 void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, const RangefinderConfig& config,
@@ -341,8 +364,9 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
     report.beam.cov.topLeftCorner(p, p) = Ldlt(fit.best.normals.H.topLeftCorner(p, p)).inverse();
     carry_lens(problem, camera, report);
   }
-  report.scale_in_sigmas =
-      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_estimated, ready.min_sigma_range_m);
+  if (!report.scale_by_need)
+    report.scale_in_sigmas =
+        scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_estimated, ready.min_sigma_range_m);
   report.bound = judge_beam(problem, report.beam, report.camera);
   report.bound.cov =
       refined ? refined->state.beam.cov : BeamMatrix(BeamMatrix::Constant(std::numeric_limits<double>::infinity()));

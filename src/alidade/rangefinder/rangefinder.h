@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "alidade/estimation/progress.h"
@@ -28,9 +29,9 @@ namespace alidade {
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
 
 /// The same of a lens' distortion that its file gives without σ: then it is better estimated, where boards determine
-/// it.
+/// it. `kind`: "k", radial; "p", tangential; empty: either.
 [[nodiscard]] bool wants_distortion(const RangefinderReport& report, const Camera& camera,
-                                    const RangefinderConfig& config);
+                                    const RangefinderConfig& config, std::string_view kind = "");
 
 /// Why shots that no beam explains may do so: with the ranges in another unit, each range a row before or after its
 /// spot and board, or spots with u and v exchanged or mirrored, a beam explains them well. One sentence; empty where

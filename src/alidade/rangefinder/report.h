@@ -41,18 +41,28 @@ struct FixedQuantity {
 
 /// An error that the measurements of all shots may share, tested by itself (score test).
 struct ShotCause {
-  std::string name;   ///< drift: of the readings over the rows; bend: over their range; wander: of the spots over the
-                      ///< rows; bent: of the board out of its plane
-  double size = 0.0;  ///< From the first row to the last; of bend, at the ends of the span.
+  /// drift: of the readings over the rows; bend: over their range; incidence: with the tangent of the angle of
+  /// incidence; sheet: the beam meets a surface that lies before or behind the plane of the corners; wander: of the
+  /// spots over the rows; bent: of the board out of its plane
+  std::string name;
+  double size = 0.0;  ///< From the first row to the last; of bend, at the ends of the span; of incidence, at 45°.
   std::string unit;
-  double sigmas = 0.0;                    ///< By how many σ the residuals indicate it.
+  double sigmas = 0.0;                    ///< By how many σ the residuals indicate it; 0 with too few shots.
   BeamVector moves = BeamVector::Zero();  ///< Of the beam, were it of that size.
+  /// Of the beam, by σ of what the shots leave open of it, where a σ of it was told.
+  BeamVector left_open = BeamVector::Zero();
 };
 
 /// Distortion that the camera file gave without σ, and that was estimated from the shots.
 struct FreedDistortion {
   std::string name;  ///< k1, k2
   double was = 0.0, value = 0.0, sigma = 0.0;
+};
+
+/// A σ that was told, and that is far less than the residuals show: it was estimated from them.
+struct OverruledSigma {
+  std::string name;  ///< sigma_range_m, sigma_px
+  double told = 0.0, found = 0.0;
 };
 
 /// How well these shots determine the beam, and their geometry.
@@ -89,9 +99,10 @@ struct RangefinderReport {
   std::vector<FixedQuantity> fixed;
   std::vector<ShotCause> causes;
   std::vector<FreedDistortion> freed_distortion;  ///< Empty: the file's holds.
-  bool scale_by_need = false;                     ///< The scale was estimated as a nuisance parameter, not as a result.
-  std::vector<Beam> alternatives;                 ///< Other beams that fit as well.
-  std::vector<ShotFit> shots;                     ///< One per shot.
+  std::vector<OverruledSigma> overruled_sigmas;
+  bool scale_by_need = false;      ///< The scale was estimated as a nuisance parameter, not as a result.
+  std::vector<Beam> alternatives;  ///< Other beams that fit as well.
+  std::vector<ShotFit> shots;      ///< One per shot.
   BeamBound bound;
   double sigma_spot_px = 0.0;  ///< Of spots that do not bring their own.
   double sigma_corner_px = 0.0;

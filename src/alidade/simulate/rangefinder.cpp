@@ -176,6 +176,7 @@ namespace {
 struct BentBoard {
   BoardBend bend;
   Eigen::Vector3d size_m;
+  double sheet_m;  ///< Before it.
 
   [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector3d& point_in_board) const {
     return point_in_board + bend.heights_at(point_in_board).dot(size_m) * Eigen::Vector3d::UnitZ();
@@ -184,7 +185,7 @@ struct BentBoard {
   [[nodiscard]] double range_m(const Rigid3& cam_from_board, const Beam& beam, double range_m) const {
     const Eigen::Vector3d hit = cam_from_board.inverse() * point_at(beam, range_m);
     const double cosine = (cam_from_board.rotation * Eigen::Vector3d::UnitZ()).dot(beam.direction_in_cam);
-    return range_m + (at(hit) - hit).z() / (cosine * beam.scale);
+    return range_m + ((at(hit) - hit).z() - sheet_m) / (cosine * beam.scale);
   }
 };
 
@@ -193,7 +194,7 @@ struct BentBoard {
 SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& noise, std::uint64_t seed) {
   Draws draws(seed);
   const std::vector<Eigen::Vector3d> points = points_in_board(scene.board);
-  const BentBoard board{BoardBend(points), {noise.bow_m, 0.0, noise.twist_m}};
+  const BentBoard board{BoardBend(points), {noise.bow_m, 0.0, noise.twist_m}, noise.sheet_m};
   SimulatedShots simulated{{}, draw_outliers(scene.range_m.size(), noise.outlier_share, draws)};
   const Eigen::Matrix2d cov =
       std::max(1e-12, noise.sigma_corner_px * noise.sigma_corner_px) * Eigen::Matrix2d::Identity();
@@ -205,6 +206,7 @@ SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& no
     Shot shot;
     shot.name = "shot " + std::to_string(i + 1);
     shot.range_m = true_range_m + scene.beam.noise.sigma_at(true_range_m, tangent) * draws.normal();
+    shot.range_m += noise.incidence_m * tangent;
     const double miss_m = draws.uniform(0.3, 1.0);
     if (simulated.is_outlier[i]) shot.range_m += miss_m;
     const auto spot = project(scene.camera, point_at(scene.beam, true_range_m));
@@ -242,12 +244,17 @@ std::vector<Shot> mistaken_shots(std::vector<Shot> shots, const ShotMistake& mis
   return shots;
 }
 
-Camera mistaken_camera(Camera camera, double focal, double centre_px, double k1) {
-  if (k1 != 0.0) camera = with_distortion(camera);
+Camera mistaken_camera(Camera camera, const ShotMistake& mistake) {
+  const bool has_distortion = mistake.k1 != 0.0 || mistake.p1 != 0.0;
+  if (has_distortion) camera = with_distortion(camera);
   Eigen::VectorXd values = params(camera.lens);
-  values.head<2>() *= 1.0 + focal;
-  values.segment<2>(2).array() += centre_px;
-  if (k1 != 0.0) values[Brown::num_params - 5] += k1;
+  values.head<2>() *= 1.0 + mistake.focal;
+  values.segment<2>(2).array() += mistake.centre_px;
+  if (has_distortion) {
+    const std::vector<std::string> names = param_names(camera.lens);
+    values[std::ranges::find(names, "k1") - names.begin()] += mistake.k1;
+    if (mistake.p1 != 0.0) values[std::ranges::find(names, "p1") - names.begin()] += mistake.p1;
+  }
   camera.lens = with_params(camera.lens, values);
   return camera;
 }

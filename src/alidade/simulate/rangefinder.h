@@ -40,6 +40,8 @@ struct ShotNoise {
   double outlier_share = 0.0;       ///< Of the shots, rounded: their readings are 0.3 to 1 m too long.
   double bow_m = 0.0;               ///< Of the board along its rows: of its centre over its left and right border.
   double twist_m = 0.0;             ///< Of its corners out of its plane.
+  double incidence_m = 0.0;         ///< That a reading at 45° is too long by; grows with the tangent of that angle.
+  double sheet_m = 0.0;             ///< By which what the beam hits lies before the plane of the corners.
   bool with_spot = true, with_board = true;
 };
 
@@ -63,6 +65,7 @@ struct ShotMistake {
   double focal = 0.0;        ///< Share by which the camera file's focal length is too long.
   double centre_px = 0.0;    ///< By which its centre lies aside, in u and in v.
   double k1 = 0.0;           ///< By which its k1 is too large, for the file's σ of fx, fy, cx, cy alone.
+  double p1 = 0.0;           ///< By which its p1 is too large, the same.
   double drift_m = 0.0;      ///< That the readings are too long by at the last shot, evenly from none at the first.
   double bend_m = 0.0;       ///< That a reading of 1 m or 3 m is too long by against one of 2 m: a parabola.
   double wander_px = 0.0;    ///< That the spots stand lower and to the right by at the last shot, as the drift.
@@ -72,6 +75,6 @@ struct ShotMistake {
   int shift_rows = 0;        ///< The ranges stand so many rows later than their boards and spots.
 };
 [[nodiscard]] std::vector<Shot> mistaken_shots(std::vector<Shot> shots, const ShotMistake& mistake);
-[[nodiscard]] Camera mistaken_camera(Camera camera, double focal, double centre_px, double k1 = 0.0);
+[[nodiscard]] Camera mistaken_camera(Camera camera, const ShotMistake& mistake);
 
 }  // namespace alidade

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "alidade/rangefinder/rangefinder.h"
@@ -22,8 +23,9 @@ struct RangefinderTrialSetup {
   int num_shots = 18;
   bool gives_lengths = false;  ///< The user takes the readings' scale and the squares for exact.
   bool asks_scale = false;     ///< The user takes the squares for exact and estimates the readings' scale.
-  bool has_boards = true;      ///< Else spots alone are left.
-  bool is_mirrored = false;    ///< The images are, left to right.
+  std::optional<double> sigma_range_m = {}, sigma_flat_m = {};  ///< Told by the user.
+  bool has_boards = true;                                       ///< Else spots alone are left.
+  bool is_mirrored = false;                                     ///< The images are, left to right.
 };
 
 /// The shots as their mirrored images show them.
@@ -55,8 +57,10 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
   if (!setup.has_boards)
     for (Shot& shot : shots) shot.board.reset();
   if (setup.is_mirrored) mirror(shots, sample.camera.width_px);
-  const Camera camera = mistaken_camera(sample.camera, setup.mistake.focal, setup.mistake.centre_px, setup.mistake.k1);
+  const Camera camera = mistaken_camera(sample.camera, setup.mistake);
   RangefinderConfig given{.method = setup.method};
+  given.sigma_range_m = setup.sigma_range_m;
+  given.sigma_flat_m = setup.sigma_flat_m;
   if (setup.gives_lengths) given.sigma_scale = given.sigma_square_m = 0.0;
   if (setup.asks_scale) {
     given.estimate_scale = true;

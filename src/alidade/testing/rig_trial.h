@@ -58,7 +58,9 @@ inline RigTrial rig_trial(const RigTrialSetup& setup, std::uint64_t seed) {
   for (const RigHead& rig_head : scene.rig.heads) {
     const bool is_mistaken = !setup.first_lens_only || cameras.empty();
     Camera& camera = cameras[rig_head.head.id] =
-        is_mistaken ? mistaken_camera(rig_head.camera, setup.mistake.focal, setup.mistake.centre_px) : rig_head.camera;
+        is_mistaken
+            ? mistaken_camera(rig_head.camera, {.focal = setup.mistake.focal, .centre_px = setup.mistake.centre_px})
+            : rig_head.camera;
     const Eigen::Index num = params(camera.lens).size();
     camera.cov.setZero(num, num);  // its file says that it is exact
     camera.cov.diagonal().head<4>().setConstant(setup.sigma_lens_px * setup.sigma_lens_px);

@@ -15,6 +15,7 @@ double ordinary_error(const FixedQuantity& thing) {
   if (thing.name == "camera.f") return 0.003 * thing.value;
   if (thing.name.starts_with("camera.c")) return 2.0;
   if (thing.name.starts_with("camera.k")) return 0.01;
+  if (thing.name.starts_with("camera.p")) return 0.0001;
   if (thing.name == "board.flat_m") return 0.0003;
   return 0.2 * thing.value;  // a σ
 }
@@ -26,7 +27,8 @@ const char* remedy_of(const RangefinderReport& report, const std::string& name) 
     return "measure the squares and give --sigma-square, or estimate the readings' scale: --scale";
   if (name == "scale") return "give --sigma-scale, or estimate it: --scale";
   if (name.starts_with("camera")) return "use a camera file with covariance: alidade calibrate";
-  if (name == "board.flat_m") return "glue the board to something flat, and let the spot fall on the print";
+  if (name == "board.flat_m")
+    return "glue the board to something flat, let the spot fall on the print, and give --sigma-flat";
   return "leave the option away: it is estimated from the residuals";
 }
 
@@ -52,7 +54,9 @@ void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumpt
     put_move_of("scale", moves.tail<1>(), std::sqrt(cov(beam_scale_param, beam_scale_param)), assumption);
 }
 
-bool is_of_distortion(const FixedQuantity& thing) { return thing.name.starts_with("camera.k"); }
+bool is_of_distortion(const FixedQuantity& thing) {
+  return thing.name.starts_with("camera.k") || thing.name.starts_with("camera.p");
+}
 
 bool is_of_lengths(const FixedQuantity& thing) { return thing.name == "scale" || thing.name == "square_m"; }
 
@@ -77,13 +81,15 @@ std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report)
   return assumed;
 }
 
-bool wants_distortion(const RangefinderReport& report, const Camera& camera, const RangefinderConfig& config) {
+bool wants_distortion(const RangefinderReport& report, const Camera& camera, const RangefinderConfig& config,
+                      std::string_view kind) {
   constexpr double asks_beyond = 3.0;
   if (config.refine != Refine::all || !config.refine_distortion || lens_prior(camera, true).free.empty()) return false;
   const bool has_boards =
       std::any_of(report.shots.begin(), report.shots.end(), [](const ShotFit& fit) { return fit.pose.has_value(); });
   return has_boards && std::any_of(report.fixed.begin(), report.fixed.end(), [&](const FixedQuantity& thing) {
-           if (!is_of_distortion(thing) || thing.sigma) return false;
+           if (!is_of_distortion(thing) || thing.sigma || !thing.name.substr(sizeof "camera." - 1).starts_with(kind))
+             return false;
            return std::abs(thing.asked) > asks_beyond * thing.asked_sigma || assumption_of(report, thing).moves > 1.0;
          });
 }

@@ -24,8 +24,7 @@ std::string unit_of(double scale) {
 /// A scale that was estimated as nobody gave it, and is not 1: the rangefinder's, or that of the board.
 void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.0, beyond_chance = 2.0, beyond_an_instrument = 0.05;
-  const double away = report.beam.scale - 1.0, sigma = std::sqrt(report.beam.cov(beam_scale_param, beam_scale_param));
-  const double z = std::abs(away) / sigma;
+  const double away = report.beam.scale - 1.0, z = std::abs(report.scale_in_sigmas);
   Check check = check_of("scale", z < ask_beyond ? State::good : State::care, "the readings' scale is 1 within its σ",
                          z, ask_beyond, "σ", "residuals");
   if (z >= beyond_chance)
@@ -68,7 +67,7 @@ void add_scale(const RangefinderReport& report, const RangefinderConfig& config,
                                       report.beam.scale, 1.0, "", "residuals"));
   add_asked_scale(report, config, verdict);
   constexpr double ask_beyond = 4.0;
-  const double z = std::abs(report.scale_in_sigmas);
+  const double z = config.scale_by_need ? 0.0 : std::abs(report.scale_in_sigmas);
   if (z == 0.0) return;
   verdict.checks.push_back(check_of("scale", z < ask_beyond ? State::good : State::care,
                                     z < ask_beyond ? "no scale of the readings is indicated"
@@ -82,6 +81,7 @@ std::string asked_of_lens(const FixedQuantity& thing) {
   const bool is_pixels = name == "f" || name.starts_with("c");
   return (name == "f"             ? "a focal length of "
           : name.starts_with("c") ? "a centre " + name + " of "
+          : name.starts_with("p") ? "a tangential distortion " + name + " of "
                                   : "a distortion " + name + " of ") +
          text_of(thing.value + thing.asked, is_pixels ? 5 : 3) + (is_pixels ? " px, not " : ", not ") +
          text_of(thing.value, is_pixels ? 5 : 3);
@@ -149,36 +149,87 @@ void add_freed_distortion(const RangefinderReport& report, Verdict& verdict) {
     if (!(z > check.value)) continue;
     check.value = z;
     if (z > ask_beyond) check.state = State::care;
-    check.text = one.name + " is " + text_of(one.value, 3) + " ± " + text_of(3.0 * one.sigma, 2) + " (3σ), not " +
-                 text_of(one.was, 3) + " as in the camera file, which gives it without σ: calibrate the camera again";
+    check.text = (one.name.starts_with("p") ? "the camera's tangential distortion " : "") + one.name + " is " +
+                 text_of(one.value, 3) + " ± " + text_of(3.0 * one.sigma, 2) + " (3σ), not " + text_of(one.was, 3) +
+                 " as in the camera file, which gives it without σ: calibrate the camera again";
   }
   if (check.state == State::good)
     check.text = "the camera file gives its distortion without σ: it is estimated too, and agrees with the file";
   verdict.checks.push_back(std::move(check));
 }
 
+/// Causes that few shots tell apart: of these the one that explains most is named.
+bool is_alike(const ShotCause& cause) {
+  return cause.name == "bend" || cause.name == "incidence" || cause.name == "sheet";
+}
+
+/// What of the cause, of that size, a user would see.
+std::string said_of(const ShotCause& cause) {
+  const std::string size =
+      cause.unit == "m" ? text_of(1e3 * cause.size, 2) + " mm" : text_of(cause.size, 2) + " " + cause.unit;
+  const std::string by = " (" + text_of(cause.sigmas, 2) + "σ)";
+  if (cause.name == "drift")
+    return "the readings drift by " + size + " from the first row to the last" + by +
+           ": let the rangefinder warm up, or something was moved";
+  if (cause.name == "bend")
+    return "the readings curve over their range, by " + size + " at its ends" + by +
+           ": the rangefinder is not linear, or the board or the lens is not as given";
+  if (cause.name == "incidence")
+    return "the readings depend on the angle of incidence, by " + size + " at 45°" + by +
+           ": of a spot that is long on a tilted board; tilt boards less, or by the same as what is measured later";
+  if (cause.name == "sheet")
+    return "the beam meets a surface that lies " + size + " off the plane of the corners" + by +
+           ", as of a sheet before the print: let it meet the print";
+  return "the spots wander by " + size + " from the first row to the last" + by +
+         ": the rangefinder, or the camera's lens, was moved";
+}
+
+/// What else explains nearly as much as the cause does.
+std::string alike(const ShotCause& cause, const std::vector<ShotCause>& causes) {
+  constexpr double told_apart = 2.5;  // σ, of the difference of χ²
+  std::string others;
+  for (const ShotCause& other : causes) {
+    if (!is_alike(other) || other.name == cause.name) continue;
+    if (cause.sigmas * cause.sigmas - other.sigmas * other.sigmas > told_apart * told_apart) continue;
+    others += (others.empty() ? "" : " and ");
+    others += other.name == "bend"        ? "readings that curve over their range"
+              : other.name == "incidence" ? "readings that depend on incidence"
+                                          : "a sheet before the print";
+  }
+  return others.empty() ? "" : "; " + others + " cannot be told apart from it here";
+}
+
 /// What the errors of all shots share.
 void add_shared_errors(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 3.5;
+  double most = 0.0;
+  for (const ShotCause& cause : report.causes)
+    if (is_alike(cause)) most = std::max(most, cause.sigmas);
   for (const ShotCause& cause : report.causes) {
     if (cause.name == "bent") continue;
-    const bool is_quiet = cause.sigmas < ask_beyond;
-    const std::string size =
-        cause.unit == "m" ? text_of(1e3 * cause.size, 2) + " mm" : text_of(cause.size, 2) + " " + cause.unit;
-    const std::string by = " (" + text_of(cause.sigmas, 2) + "σ)";
-    const auto said = [&]() -> std::string {
-      if (cause.name == "drift")
-        return "the readings drift by " + size + " from the first row to the last" + by +
-               ": let the rangefinder warm up, or something was moved";
-      if (cause.name == "bend")
-        return "the readings curve over their range, by " + size + " at its ends" + by +
-               ": the rangefinder is not linear, or the board or the lens is not as given";
-      return "the spots wander by " + size + " from the first row to the last" + by +
-             ": the rangefinder, or the camera's lens, was moved";
-    };
-    verdict.checks.push_back(check_of(cause.name, is_quiet ? State::good : State::care,
-                                      is_quiet ? "no " + cause.name + " of the shots is indicated" : said(),
-                                      cause.sigmas, ask_beyond, "σ", "residuals"));
+    Check check = check_of(cause.name, State::good, "no " + cause.name + " of the shots is indicated", cause.sigmas,
+                           ask_beyond, "σ", "residuals");
+    if (cause.sigmas >= ask_beyond && is_alike(cause) && cause.sigmas < most) {
+      check.text = "another cause explains more than " + cause.name + " (" + text_of(cause.sigmas, 2) + "σ) would";
+    } else if (cause.sigmas >= ask_beyond) {
+      check.state = State::care;
+      check.text = said_of(cause) + (is_alike(cause) ? alike(cause, report.causes) : "");
+    }
+    verdict.checks.push_back(std::move(check));
+  }
+}
+
+/// σ that were told and overruled.
+void add_overruled(const RangefinderReport& report, Verdict& verdict) {
+  for (const OverruledSigma& one : report.overruled_sigmas) {
+    const bool is_range = one.name == "sigma_range_m";
+    const double unit = is_range ? 1e3 : 1.0, times = one.found / one.told;
+    verdict.checks.push_back(
+        check_of("noise told", State::care,
+                 (is_range ? "the readings scatter by " : "the spots scatter by ") + text_of(unit * one.found, 2) +
+                     (is_range ? " mm, " : " px, ") + text_of(times, 2) + " times " +
+                     (is_range ? "--sigma-range-m" : "--sigma-px") + ": what they scatter by was used; tell so",
+                 times, 1.0, "", "residuals"));
   }
 }
 
@@ -265,6 +316,7 @@ void add_range_noise(const RangefinderReport& report, Verdict& verdict) {
 
 void add_cause_checks(const RangefinderReport& report, std::span<const Shot> shots, const RangefinderConfig& config,
                       Verdict& verdict) {
+  add_overruled(report, verdict);
   add_scale(report, config, verdict);
   add_bent_board(report, verdict);
   add_camera(report, verdict);

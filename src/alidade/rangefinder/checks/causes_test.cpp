@@ -54,6 +54,15 @@ INSTANTIATE_TEST_SUITE_P(
         ShotFault{"centre", [](RangefinderTrialSetup& s) { s.mistake.centre_px = 20.0; }, false},
         ShotFault{"distortion_small", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.01; }},
         ShotFault{"distortion", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.05; }},
+        ShotFault{"tangential_small", [](RangefinderTrialSetup& s) { s.mistake.p1 = 0.0005; }, false},
+        ShotFault{"tangential", [](RangefinderTrialSetup& s) { s.mistake.p1 = 0.002; }, false},
+        ShotFault{"tangential_four_shots", [](RangefinderTrialSetup& s) { s.mistake.p1 = 0.002, s.num_shots = 4; },
+                  false},
+        ShotFault{"incidence_small", [](RangefinderTrialSetup& s) { s.noise.incidence_m = 0.008; }, false},
+        ShotFault{"incidence", [](RangefinderTrialSetup& s) { s.noise.incidence_m = 0.02; }, false},
+        ShotFault{"sheet_told", [](RangefinderTrialSetup& s) { s.noise.sheet_m = 0.006, s.sigma_flat_m = 0.004; },
+                  false},
+        ShotFault{"sheet", [](RangefinderTrialSetup& s) { s.noise.sheet_m = 0.03; }, false},
         ShotFault{"bow_small", [](RangefinderTrialSetup& s) { s.noise.bow_m = 0.0005; }},
         ShotFault{"bow", [](RangefinderTrialSetup& s) { s.noise.bow_m = 0.0015; }},
         ShotFault{"twist", [](RangefinderTrialSetup& s) { s.noise.twist_m = 0.0015; }},
@@ -121,7 +130,7 @@ TEST(ShotFaults, DistortionGivenWithoutSigmaIsEstimated) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const RangefinderTrial trial = rangefinder_trial(setup, seed);
     const auto& freed = trial.solved.report.freed_distortion;
-    ASSERT_EQ(freed.size(), 2u) << seed;
+    ASSERT_GE(freed.size(), 2u) << seed;
     EXPECT_NEAR(freed[0].value, 0.0, 4.0 * freed[0].sigma);
     EXPECT_LT(trial.worst_sigmas, 4.5) << seed;
   }
@@ -154,6 +163,49 @@ TEST(ShotFaults, ABentBoardIsNoOtherLensNorALensABentBoard) {
       EXPECT_FALSE(says(zoomed, seed, "the board is not flat")) << seed;
     }
   }
+}
+
+/// In how many of 20 logs the verdict has the words.
+int num_that_say(const RangefinderTrialSetup& setup, const char* words) {
+  int num = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Verdict verdict = rangefinder_trial(setup, 300 + seed).solved.verdict;
+    num += verdict.state == State::care && verdict.to_add.find(words) != std::string::npos;
+  }
+  return num;
+}
+
+/// Each ● before, 6 to 20σ off.
+TEST(ShotFaults, WhatALensAReadingOrABoardHasIsNamed) {
+  RangefinderTrialSetup tangential, incidence, sheet;
+  tangential.mistake.p1 = 0.006;
+  incidence.noise.incidence_m = 0.03;
+  sheet.noise.sheet_m = 0.03;
+  EXPECT_GE(num_that_say(tangential, "tangential distortion"), 19);
+  EXPECT_GE(num_that_say(incidence, "incidence"), 19);
+  EXPECT_GE(num_that_say(sheet, "off the plane of the corners"), 19);
+}
+
+/// A lens or a drift was blamed, or nothing, where the readings scatter by six times what was told.
+TEST(ShotFaults, NoiseThatIsToldTooSmallIsNamed) {
+  RangefinderTrialSetup setup;
+  setup.sigma_range_m = 0.00033;
+  EXPECT_GE(num_that_say(setup, "times --sigma-range-m"), 19);
+  setup.sigma_range_m = 0.002;
+  EXPECT_EQ(num_that_say(setup, "times --sigma-range-m"), 0);
+}
+
+/// A sheet before the print moves the origin by its thickness: what is told of it is counted, and 0 counts nothing.
+TEST(ShotFaults, ASheetIsCountedAsTold) {
+  const auto sigma_m = [](std::optional<double> sigma_flat_m) {
+    RangefinderTrialSetup setup;
+    setup.sigma_flat_m = sigma_flat_m;
+    const RangefinderReport report = rangefinder_trial(setup, 7).solved.report;
+    return std::sqrt(report.beam.cov(2, 2));
+  };
+  EXPECT_EQ(sigma_m(0.0), sigma_m({}));
+  EXPECT_LT(sigma_m({}), 0.9 * sigma_m(0.002));
+  EXPECT_LT(sigma_m(0.002), sigma_m(0.01));
 }
 
 TEST(ShotFaults, CleanShotsStand) {

@@ -306,8 +306,8 @@ Verdict verdict_of_beam(const RangefinderReport& report, std::span<const Check> 
     verdict.to_add = care->text;
     // What is wrong comes before what follows from it.
     for (const std::string_view cause :
-         {"shots agree", "spots by distance", "bend", "drift", "wander", "scale", "fit", "outliers", "boards", "camera",
-          "distortion", "bent", "spots outside", "columns", "mirrored"})
+         {"shots agree", "spots by distance", "bend", "incidence", "sheet", "drift", "wander", "scale", "fit",
+          "outliers", "boards", "camera", "distortion", "bent", "noise told", "spots outside", "columns", "mirrored"})
       for (const Check& check : checks)
         if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
   }

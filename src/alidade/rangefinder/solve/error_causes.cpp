@@ -54,10 +54,28 @@ std::pair<double, double> span_of_readings(const BeamProblem& problem) {
   return {0.5 * (least + most), 0.5 * (most - least)};
 }
 
+/// What is tested, and what of it is known before.
+struct TestedCause {
+  std::string name, unit;
+  Index num = 1;               ///< Of its parameters.
+  double num_estimated = 0.0;  ///< Residuals from which the σ was estimated; 0: it was given.
+  double told = 0.0;           ///< σ of its size; 0: none is told.
+};
+
+/// A step of the solve as one of the beam.
+BeamVector beam_part(const SolvedPart& part, const VectorXd& step) {
+  const Index num_beam =
+      std::count_if(part.places.begin(), part.places.end(), [](Index place) { return place < num_beam_params; });
+  BeamVector beam = BeamVector::Zero();
+  beam.head(num_beam) = step.head(num_beam);
+  return beam;
+}
+
 template <typename ShareOf>
-std::optional<ShotCause> tested(const std::string& name, const std::string& unit, Index num, double num_estimated,
-                                const ReducedSystem& system, const SolvedPart& part, const VectorXd& g,
-                                const ShareOf& share_of, ErrorScore ReducedShot::*score = &ReducedShot::errors) {
+std::optional<ShotCause> tested(const TestedCause& candidate, const ReducedSystem& system, const SolvedPart& part,
+                                const VectorXd& g, const ShareOf& share_of,
+                                ErrorScore ReducedShot::*score = &ReducedShot::errors) {
+  const Index num = candidate.num;
   VectorXd s = VectorXd::Zero(num);
   MatrixXd I = MatrixXd::Zero(num, num), across = MatrixXd::Zero(num, static_cast<Index>(part.places.size()));
   for (const ReducedShot& shot : system.shots) {
@@ -71,52 +89,101 @@ std::optional<ShotCause> tested(const std::string& name, const std::string& unit
   const VectorXd alone = I.diagonal();
   s -= across * part.inverse * g;
   I -= across * part.inverse * across.transpose();
+  ShotCause cause{.name = candidate.name, .unit = candidate.unit};
+  if (candidate.told > 0.0 && s.allFinite()) {
+    const double left = 1.0 / std::sqrt(std::pow(candidate.told, -2) + std::max(0.0, I(0, 0)));
+    cause.left_open = beam_part(part, -part.inverse * across.row(0).transpose() * left);
+  }
   // What the beam takes up but for a thousandth is not determined.
-  if (!(I.diagonal().array() > 1e-3 * alone.array()).all() || !s.allFinite()) return std::nullopt;
+  if (!(I.diagonal().array() > 1e-3 * alone.array()).all() || !s.allFinite())
+    return candidate.told > 0.0 ? std::optional(cause) : std::nullopt;
   const VectorXd size = -Ldlt(I).solve(s);
   const double chi2 = -size.dot(s);
-  ShotCause cause{name, size.norm(), unit, score_sigmas(chi2, static_cast<double>(num), num_estimated)};
-  const VectorXd step = -part.inverse * across.transpose() * size;
-  const Index num_beam =
-      std::count_if(part.places.begin(), part.places.end(), [](Index place) { return place < num_beam_params; });
-  cause.moves.head(num_beam) = step.head(num_beam);
+  cause.size = size.norm();
+  cause.sigmas = score_sigmas(chi2, static_cast<double>(num), candidate.num_estimated);
+  cause.moves = beam_part(part, -part.inverse * across.transpose() * size);
   return cause;
+}
+
+/// Of each shot that was used, what of its three errors a cause is.
+struct ShotShares {
+  std::vector<double> over_rows, over_range, tangent;
+  std::vector<Eigen::Vector3d> sheet;  ///< For a metre between the surface that the beam meets and the corners.
+};
+
+ShotShares shares_of(const BeamProblem& problem, const RangefinderReport& report) {
+  const std::size_t num = problem.shots.size();
+  ShotShares shares{std::vector(num, 0.0), std::vector(num, 0.0), std::vector(num, 0.0),
+                    std::vector<Eigen::Vector3d>(num, Eigen::Vector3d::Zero())};
+  const double last = std::max(1.0, static_cast<double>(report.shots.size()) - 1.0);
+  const auto [middle_m, half_m] = span_of_readings(problem);
+  for (std::size_t i = 0; i < num; ++i) {
+    const PreparedShot& shot = problem.shots[i];
+    shares.over_rows[i] = static_cast<double>(shot.index) / last - 0.5;
+    if (half_m > 0.0) shares.over_range[i] = std::pow((shot.range_m - middle_m) / half_m, 2);
+    const auto residual = shot.used && shot.plane ? shot_residual(shot, report.beam, report.camera, problem.model)
+                                                  : std::optional<ShotResidual>{};
+    if (!residual) continue;
+    const double cosine = std::abs(shot.plane->normal_in_cam.dot(report.beam.direction_in_cam));
+    shares.tangent[i] = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
+    // A surface that lies before the plane by a metre: one whose d is so much larger.
+    const auto by_d = residual->J_plane.col(3);
+    shares.sheet[i][0] = -by_d[0];
+    if (shot.spot_px) shares.sheet[i].tail<2>() = -by_d.tail<2>();
+  }
+  return shares;
+}
+
+/// How many residuals say of each σ what it is; 0: it was given.
+struct Estimated {
+  double of_ranges = 0.0, of_spots = 0.0;
+};
+
+Estimated estimated_by(const BeamProblem& problem, const Measured& measured, const RangefinderReport& report) {
+  const double left = 1.0 - problem.num_free() / std::max(1.0, measured.rows);
+  return {report.range_sigma_is_estimated ? left * measured.of_ranges : 0.0,
+          report.spot_sigma_is_estimated ? left * measured.of_spots : 0.0};
 }
 
 }  // namespace
 
 std::vector<ShotCause> error_causes(const BeamProblem& problem, const ReducedSystem& system, const SolvedPart& part,
-                                    const LensPrior& prior, const RangefinderReport& report) {
-  constexpr double enough = 7.0;  // shots
-  std::vector<ShotCause> causes;
-  if (static_cast<double>(system.shots.size()) < enough) return causes;
+                                    const LensPrior& prior, const RangefinderReport& report,
+                                    const RangefinderConfig& config) {
+  constexpr std::size_t enough = 7;  // shots
   const Measured measured = measured_by(problem);
-  const double left = 1.0 - problem.num_free() / std::max(1.0, measured.rows);
-  const double of_ranges = report.range_sigma_is_estimated ? left * measured.of_ranges : 0.0;
-  const double of_spots = report.spot_sigma_is_estimated ? left * measured.of_spots : 0.0;
+  const auto [of_ranges, of_spots] = estimated_by(problem, measured, report);
   const VectorXd g = gradient_of(system, prior, report.camera)(part.places);
-  const auto add = [&](const auto& cause) {
-    if (cause) causes.push_back(*cause);
+  const ShotShares shares = shares_of(problem, report);
+  const bool has_corners = std::ranges::any_of(system.shots, &ReducedShot::has_corners);
+  std::vector<ShotCause> causes;
+  const auto add = [&](const TestedCause& candidate, const auto& share_of, auto score) {
+    if (auto cause = tested(candidate, system, part, g, share_of, score)) causes.push_back(std::move(*cause));
   };
-  const double last = std::max(1.0, static_cast<double>(report.shots.size()) - 1.0);
-  const auto over_rows = [&](std::size_t index) {
-    return static_cast<double>(problem.shots[index].index) / last - 0.5;
-  };
-  const auto [middle_m, half_m] = span_of_readings(problem);
-  add(tested("drift", "m", 1, of_ranges, system, part, g,
-             [&](std::size_t index) { return Share(over_rows(index) * Eigen::Vector3d::UnitX()); }));
-  if (half_m > 0.0)
-    add(tested("bend", "m", 1, of_ranges, system, part, g, [&, at = middle_m, half = half_m](std::size_t index) {
-      return Share(std::pow((problem.shots[index].range_m - at) / half, 2) * Eigen::Vector3d::UnitX());
-    }));
-  if (std::ranges::any_of(system.shots, &ReducedShot::has_corners))
-    add(tested(
-        "bent", "m", 3, rows_of_corners(problem), system, part, g,
-        [](std::size_t) { return Share(Eigen::Matrix3d::Identity()); }, &ReducedShot::bend));
+  const auto of_errors = &ReducedShot::errors;
+  const auto of_reading = [](double share) { return Share(share * Eigen::Vector3d::UnitX()); };
+  add(
+      {"drift", "m", 1, of_ranges}, [&](std::size_t i) { return of_reading(shares.over_rows[i]); }, of_errors);
+  add(
+      {"bend", "m", 1, of_ranges}, [&](std::size_t i) { return of_reading(shares.over_range[i]); }, of_errors);
+  add(
+      {"incidence", "m", 1, of_ranges}, [&](std::size_t i) { return of_reading(shares.tangent[i]); }, of_errors);
+  if (has_corners)
+    add(
+        {"sheet", "m", 1, of_ranges, config.sigma_flat_m.value_or(0.0)},
+        [&](std::size_t i) { return Share(shares.sheet[i]); }, of_errors);
+  if (has_corners)
+    add(
+        {"bent", "m", 3, rows_of_corners(problem)}, [](std::size_t) { return Share(Eigen::Matrix3d::Identity()); },
+        &ReducedShot::bend);
   if (measured.has_spots)
-    add(tested("wander", "px", 2, of_spots, system, part, g, [&](std::size_t index) {
-      return Share(over_rows(index) * Eigen::Matrix3d::Identity().rightCols<2>());
-    }));
+    add(
+        {"wander", "px", 2, of_spots},
+        [&](std::size_t i) { return Share(shares.over_rows[i] * Eigen::Matrix3d::Identity().rightCols<2>()); },
+        of_errors);
+  if (system.shots.size() >= enough) return causes;
+  std::erase_if(causes, [](const ShotCause& cause) { return cause.left_open.isZero(0.0); });
+  for (ShotCause& cause : causes) cause = {.name = cause.name, .unit = cause.unit, .left_open = cause.left_open};
   return causes;
 }
 

@@ -77,6 +77,20 @@ std::optional<double> carried_sigma(const Camera& camera, const VectorXd& along_
   return std::sqrt(u.dot(camera.cov.topLeftCorner(4, 4) * u));
 }
 
+/// Distortion that was free within its covariance.
+void add_free_distortion(const SolvedPart& part, const LensPrior& prior, const Camera& camera,
+                         const RangefinderReport& report, std::vector<FixedQuantity>& fixed) {
+  const VectorXd values = params(camera.lens);
+  const std::vector<std::string> names = param_names(camera.lens);
+  for (const int parameter : prior.free) {
+    const std::string& name = names[static_cast<std::size_t>(parameter)];
+    if (!name.starts_with('k') && !name.starts_with('p')) continue;
+    fixed.push_back(
+        prior_along("camera." + name, VectorXd::Unit(values.size(), parameter), part, prior, camera, report));
+    fixed.back().value = values[parameter];
+  }
+}
+
 /// Distortion that is fixed, and of which the file says no σ.
 void add_distortion(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior, const Camera& camera,
                     const VectorXd& g, const RangefinderReport& report, std::vector<FixedQuantity>& fixed) {
@@ -108,6 +122,7 @@ void add_lens(const ReducedSystem& system, const SolvedPart& part, const LensPri
     }
     fixed.back().value = values[name == "camera.f" ? 0 : name == "camera.cx" ? 2 : 3];
   }
+  add_free_distortion(part, prior, camera, report, fixed);
   add_distortion(system, part, prior, camera, g, report, fixed);
 }
 
@@ -143,7 +158,7 @@ std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const S
         {.name = "square_m", .value = square_m, .moves = of_beam(-part.inverse * column(part.places), report)});
     fixed.back().sigma = config.sigma_square_m;
     // A board that is hit so far before the plane of its corners: the beam starts so much nearer.
-    fixed.push_back({.name = "board.flat_m", .value = 0.0});
+    fixed.push_back({.name = "board.flat_m", .value = 0.0, .sigma = config.sigma_flat_m});
     fixed.back().moves.head<3>() = report.beam.direction_in_cam;
   }
   if (!config.estimate_scale) {

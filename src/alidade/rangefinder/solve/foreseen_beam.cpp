@@ -42,7 +42,7 @@ ForeseenBeam::ForeseenBeam(const BeamNow& now) : now_(now), camera_(with_distort
   prior_ = lens_prior(camera_, true);
   num_ = problem_.num_free() + static_cast<Index>(prior_.free.size());
   information_ = known();
-  if (now.refine == Refine::all && !prior_.free.empty()) held_ = fixed_distortion(camera_, prior_.free);
+  if (now.refine == Refine::all && !prior_.free.empty()) held_ = fixed_distortion(camera_, prior_.free, "k");
   prior_.free.insert(prior_.free.end(), held_.begin(), held_.end());
   const auto num_lens = static_cast<Index>(prior_.free.size());
   prior_.information.setZero(num_lens, num_lens);  // it is in what is known; a shot must not bring it again

@@ -9,8 +9,8 @@
 namespace alidade {
 
 /// What is known of a beam and its lens, and what rangefinder() states of the beam with more shots: the lens free with
-/// it (Refine::all) or fixed and its covariance carried (Refine::beam), and distortion that the camera file gives
-/// without σ held, or estimated too once wants_distortion() says so. Keeps references to what it is made from.
+/// it (Refine::all) or fixed and its covariance carried (Refine::beam), and radial distortion that the camera file
+/// gives without σ held, or estimated too once wants_distortion() says so. Keeps references to what it is made from.
 class ForeseenBeam {
  public:
   explicit ForeseenBeam(const BeamNow& now);

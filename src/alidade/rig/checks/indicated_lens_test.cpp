@@ -48,7 +48,7 @@ TEST(IndicatedLens, CamerasOfTheOtherHeadAreNamedAsThat) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     RigSceneConfig config = scene_config();
     for (const RigHead& head : draw_rig_scene(config, seed).rig.heads) config.nominal.push_back(head);
-    config.nominal[1].camera = mistaken_camera(config.nominal[1].camera, 0.01, 6.0);
+    config.nominal[1].camera = mistaken_camera(config.nominal[1].camera, {.focal = 0.01, .centre_px = 6.0});
     const RigScene scene = draw_rig_scene(config, seed);
     std::map<int, Camera> cameras = testing::cameras_of(scene.rig);
     std::swap(cameras.at(1), cameras.at(2));

@@ -82,15 +82,16 @@ std::vector<FleetLine> read_rows(const std::string& path) {
 /// The cameras of a file, and what came of its rows.
 struct OfflineFleet {
   std::map<std::string, FleetCamera> cameras;
+  std::map<std::string, FleetNumbers> numbers;
   std::string alarms;
   std::size_t num_alarms = 0;
   Counts counts;
 };
 
-/// Of rows that say nothing the first ones are named.
+/// Of rows that say nothing, or not all they should, the first ones are named.
 void note_fault(const std::string& path, const FleetLine& line, FleetFault fault, Counts& counts) {
   constexpr std::size_t most_named = 20;
-  ++counts.dropped;
+  counts.dropped += says_nothing(fault) ? 1 : 0;
   if (counts.skipped.size() < most_named)
     counts.skipped.push_back({path, line.number, line.id + ": " + sentence_of(fault)});
 }
@@ -105,6 +106,7 @@ OfflineFleet through_one_worker(const std::vector<FleetLine>& lines, const Worke
     if (!row || row->n != camera.n + 1)
       throw InputError(
           fmt::format("{}:{}: a row of {}: {}", args.from, line.number, line.id, row ? "n is not the next" : fault));
+    note_time(*row, fleet.numbers[line.id]);
     ++fleet.counts.given;
     if (const auto alarm = advance(camera, *row, args.options.config)) {
       fleet.alarms += fleet_alarm_text(line.id, *alarm) + "\n";
@@ -116,7 +118,16 @@ OfflineFleet through_one_worker(const std::vector<FleetLine>& lines, const Worke
   return fleet;
 }
 
-/// Rows that say nothing are told; a camera that knows nothing because of them, or ends with one, is named.
+/// What is said of a camera, if that is more than that it is well or has changed.
+std::string complaint_of(const FleetCamera& camera, const FleetNumbers& numbers) {
+  const Verdict verdict = verdict_of(camera);
+  const std::string order = sentence_of(numbers);
+  const bool is_well = verdict.ok() && camera.last_fault == FleetFault::none && camera.off_centre_percent == 0;
+  if (is_well) return order;
+  return verdict.sentence + (order.empty() ? "" : "; " + order);
+}
+
+/// Rows that say nothing are told; the first camera that knows nothing, or of which something is to be told, is named.
 Verdict offline_verdict(const OfflineFleet& fleet, double rows_per_s) {
   const std::size_t num = fleet.cameras.size();
   Verdict verdict;
@@ -125,14 +136,20 @@ Verdict offline_verdict(const OfflineFleet& fleet, double rows_per_s) {
                   num == 1 ? "" : "s", fleet.num_alarms, rows_per_s, sizeof(FleetCamera));
   if (fleet.counts.dropped > 0) verdict.sentence += fmt::format("; {} rows say nothing", fleet.counts.dropped);
   std::vector<std::string> faulty;
-  for (const auto& [id, camera] : fleet.cameras)
-    if (camera.last_fault != FleetFault::none) faulty.push_back(id + ": " + verdict_of(camera).sentence);
+  std::size_t num_refused = 0;
+  for (const auto& [id, camera] : fleet.cameras) {
+    num_refused += estimate_of(camera).has_value ? 0 : 1;
+    const std::string complaint = complaint_of(camera, fleet.numbers.at(id));
+    if (!complaint.empty()) faulty.push_back(id + ": " + complaint);
+  }
   if (faulty.empty()) return verdict;
   verdict.state = State::care;
   verdict.sentence += "; " + faulty.front();
   if (faulty.size() > 1) verdict.sentence += fmt::format(", and {} more cameras", faulty.size() - 1);
-  verdict.to_add = "send t, the rotation and the points of every row as numbers: states.jsonl names the cameras";
-  if (fleet.counts.used == 0) {
+  verdict.to_add = fleet.counts.dropped > 0
+                       ? "send t, the rotation and the points of every row as numbers: states.jsonl names the cameras"
+                       : "see to these cameras: states.jsonl says of each what it is";
+  if (num_refused == num) {
     verdict.state = State::refused;
     verdict.exit_code = ExitCode::undetermined;
   }
@@ -147,7 +164,7 @@ ExitCode work_offline(const WorkerArgs& args, Run& run) {
   run.lap("rows");
   const double rate = static_cast<double>(lines.size()) / run.document.seconds.back().second;
   std::string states;
-  for (const auto& [id, camera] : fleet.cameras) states += fleet_state_text(id, camera) + "\n";
+  for (const auto& [id, camera] : fleet.cameras) states += fleet_state_text(id, camera, fleet.numbers.at(id)) + "\n";
   run.add_file("states.jsonl", std::move(states));
   run.add_file("alarms.jsonl", std::move(fleet.alarms));
   run.document.estimate["rows"] = lines.size();

@@ -21,14 +21,14 @@ class FleetWorkerCommand : public testing::CommandTest {
     std::istringstream in(read_file(path("fleet/rows.txt")));
     for (std::string line; std::getline(in, line);) lines_.push_back(line);
   }
-  /// The lines, after `change` of each that is of this camera.
+  /// The lines, after `change` of each that is of this camera; empty: of any.
   template <class Change>
   [[nodiscard]] Outcome work_on_changed(const std::string& id, const Change& change) const {
     std::string text;
     for (const std::string& line : lines_) {
       const std::size_t space = line.find(' ');
       auto row = nlohmann::json::parse(line.substr(space + 1));
-      if (line.substr(0, space) == id) change(row);
+      if (id.empty() || line.substr(0, space) == id) change(row);
       text += line.substr(0, space) + " " + row.dump() + "\n";
     }
     return work_on(text);
@@ -69,6 +69,38 @@ TEST_F(FleetWorkerCommand, NamesACameraWhoseRowsSayNothing) {
   EXPECT_EQ(result()["counts"]["dropped"], 60);
   EXPECT_THAT(result()["verdict"]["sentence"].get<std::string>(),
               ::testing::AllOf(::testing::HasSubstr(id()), ::testing::HasSubstr("pan and tilt")));
+}
+
+/// A camera that is refused is no success; where all are, nothing has been estimated.
+TEST_F(FleetWorkerCommand, IsNotGoodWhereACameraIsRefused) {
+  const auto exchange = [](nlohmann::json& row) {
+    for (const char* point : {"p1", "p2", "p3", "p4"})
+      std::swap(row[std::string(point) + "x"], row[std::string(point) + "y"]);
+  };
+  const Outcome one = work_on_changed(id(), exchange);
+  EXPECT_EQ(one.code, 0) << one.err;
+  EXPECT_EQ(result()["verdict"]["state"], "care");
+  EXPECT_THAT(
+      result()["verdict"]["sentence"].get<std::string>(),
+      ::testing::AllOf(::testing::HasSubstr(id()), ::testing::HasSubstr("x and y of the points are exchanged")));
+  const Outcome all = work_on_changed("", exchange);
+  EXPECT_EQ(all.code, 4) << all.err;
+}
+
+TEST_F(FleetWorkerCommand, TellsAClockThatWentBackAndATemperatureThatIsNone) {
+  const Outcome clock = work_on_changed(id(), [](nlohmann::json& row) {
+    if (row["n"] > 40) row["t"] = row["t"].get<double>() - 3600.0;
+  });
+  EXPECT_EQ(clock.code, 0) << clock.err;
+  EXPECT_EQ(result()["verdict"]["state"], "care");
+  EXPECT_THAT(result()["verdict"]["sentence"].get<std::string>(),
+              ::testing::HasSubstr("its clock went back by 3599 s"));
+  const Outcome hot = work_on_changed(id(), [](nlohmann::json& row) { row["temperature_c"] = "hot"; });
+  EXPECT_EQ(hot.code, 0) << hot.err;
+  EXPECT_EQ(result()["verdict"]["state"], "care");
+  EXPECT_EQ(result()["counts"]["used"], 120);
+  EXPECT_THAT(result()["counts"]["skipped"][0]["reason"].get<std::string>(),
+              ::testing::HasSubstr("temperature_c is not"));
 }
 
 TEST_F(FleetWorkerCommand, WhatIsNoRowIsNamedWithItsLine) {

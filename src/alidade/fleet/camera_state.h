@@ -23,8 +23,8 @@ enum class FleetPhase : std::uint8_t {
 
 enum class FleetAlarmKind : std::uint8_t { none, pan_zero, tilt_zero, focal_length, frozen, lost, focal_temperature };
 
-/// Why nothing can be taken from a row.
-enum class FleetFault : std::uint8_t { none, time, rotation, another_rotation };
+/// Why nothing can be taken from a row, or (temperature, pixel) not all of it.
+enum class FleetFault : std::uint8_t { none, time, rotation, another_rotation, too_large, temperature, pixel };
 
 /// A row of a camera: what its rotation was, and where it saw static points. NaN: not seen.
 struct FleetRow {
@@ -35,6 +35,7 @@ struct FleetRow {
   std::array<double, 4> rotation{};  ///< pan, tilt, roll [rad]; quaternion wxyz; rates x, y, z [rad/s].
   int num_points = 0;
   std::array<double, 2 * max_fleet_points> px{};
+  FleetFault in_part = FleetFault::none;  ///< A temperature or a pixel that is there, but is no number.
 };
 
 /// A static point: a direction in the base, e + a e1 + b e2, and what is known of (a, b).
@@ -69,7 +70,7 @@ struct FleetTracking {
 };
 
 struct FleetLearning {
-  /// Quaternion of the rotation, then pixels.
+  /// Pan, tilt and roll of a head as they came, else the quaternion of the rotation; then pixels.
   std::array<std::array<float, 4 + 2 * max_fleet_points>, fleet_learning_rows> rows{};
 };
 
@@ -94,6 +95,9 @@ struct FleetCamera {
   double frozen_since_s = 0.0;
   float temperature_c = std::numeric_limits<float>::quiet_NaN();  ///< The last that was known.
   FleetFault last_fault = FleetFault::none;                       ///< Of the last row.
+  std::uint8_t misread = 0;             ///< How its rotation seems to be misread; 0: it does not, or is not asked yet.
+  std::uint8_t off_centre_percent = 0;  ///< Of the image's width or height (axis 1): the principal point; 0: near.
+  std::uint8_t off_centre_axis = 0;
   union Body {
     FleetLearning learning;
     FleetTracking tracking;

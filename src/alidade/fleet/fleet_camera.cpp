@@ -9,16 +9,18 @@
 
 #include "alidade/fleet/fleet_learning.h"
 #include "alidade/fleet/fleet_model.h"
+#include "alidade/fleet/fleet_reading.h"
 #include "alidade/fleet/fleet_tracking.h"
 
 namespace alidade {
 namespace {
 
-constexpr int frozen_rows = 5;      // the same pixels so often, while the camera rotated
-constexpr double turned_px = 3.0;   // by so much that they would have moved
-constexpr double fresh_s = 3600.0;  // an alarm is in the verdict for so long
-constexpr double max_rad = 1e3;     // of an angle or a rate
-constexpr double max_c = 1e3;       // of a temperature
+constexpr int frozen_rows = 5;                      // the same pixels so often, while the camera rotated
+constexpr double turned_px = 3.0;                   // by so much that they would have moved
+constexpr double fresh_s = 3600.0;                  // an alarm is in the verdict for so long
+constexpr double max_rad = 4.0 * std::numbers::pi;  // of an angle, as observe has it: two turns
+constexpr double max_rad_s = 100.0;                 // of a rate
+constexpr double max_c = 1e3;                       // of a temperature
 constexpr double degree = std::numbers::pi / 180.0;
 
 /// Pixels far outside the image are none.
@@ -27,6 +29,8 @@ FleetRow believable(const FleetRow& row, const FleetConfig& config) {
   for (std::size_t i = 0; i < kept.px.size(); i += 2) {
     const bool is_near =
         std::abs(kept.px[i]) < 4.0 * config.width_px && std::abs(kept.px[i + 1]) < 4.0 * config.height_px;
+    const bool is_there = std::isfinite(kept.px[i]) && std::isfinite(kept.px[i + 1]);
+    if (is_there && !is_near) kept.in_part = FleetFault::pixel;
     if (!is_near) kept.px[i] = kept.px[i + 1] = std::numeric_limits<double>::quiet_NaN();
   }
   return kept;
@@ -117,8 +121,8 @@ Verdict verdict_of_state(const FleetCamera& camera) {
     verdict.sentence = "the image is frozen";
   } else if (camera.phase == FleetPhase::learning) {
     verdict.state = State::refused;
-    verdict.sentence = camera.stride > 1
-                           ? "the rows so far do not determine the camera: turn it about both axes"
+    verdict.sentence = camera.stride > 1 || camera.misread != 0
+                           ? undetermined_sentence(camera)
                            : fmt::format("learning: {} of {} rows", camera.num_buffered, fleet_learning_rows);
   } else if (camera.num_gated > frozen_rows) {
     verdict.state = State::bad;
@@ -136,21 +140,33 @@ Verdict verdict_of_state(const FleetCamera& camera) {
 }  // namespace
 
 FleetFault fault_of(const FleetCamera& camera, const FleetRow& row) {
-  const auto is_usual = [](double r) { return std::abs(r) < max_rad; };
+  const double most = row.source == FleetSource::rate ? max_rad_s : max_rad;
   const auto& r = row.rotation;
   const double length2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
   if (!std::isfinite(row.t_s)) return FleetFault::time;
-  if (!std::ranges::all_of(r, is_usual)) return FleetFault::rotation;
+  if (!std::ranges::all_of(r, [](double each) { return std::isfinite(each); })) return FleetFault::rotation;
+  if (std::ranges::any_of(r, [most](double each) { return std::abs(each) > most; })) return FleetFault::too_large;
   if (row.source == FleetSource::attitude && !(length2 > 0.0)) return FleetFault::rotation;
   return camera.has_row != 0 && row.source != camera.source ? FleetFault::another_rotation : FleetFault::none;
+}
+
+bool says_nothing(FleetFault fault) {
+  return fault != FleetFault::none && fault != FleetFault::temperature && fault != FleetFault::pixel;
 }
 
 const char* sentence_of(FleetFault fault) {
   switch (fault) {
     case FleetFault::time:
-      return "t is not a number";
+      return "t is not a number of seconds";
     case FleetFault::rotation:
-      return "its rotation is not there, no number, or too large: pan and tilt, qw qx qy qz, or omega_x omega_y";
+      return "its rotation is not there, or no number: pan and tilt, qw qx qy qz, or omega_x omega_y";
+    case FleetFault::too_large:
+      return "its angles are more than two turns, or its rates beyond 100 rad/s: rad are expected, of degrees pan_deg "
+             "and tilt_deg";
+    case FleetFault::temperature:
+      return "temperature_c is not a number";
+    case FleetFault::pixel:
+      return "a pixel is not a number, or far outside an image of the size given";
     case FleetFault::another_rotation:
       return "its rotation is of another kind than that of the first rows";
     case FleetFault::none:
@@ -168,7 +184,9 @@ std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& given, co
     camera.num_points = static_cast<std::uint8_t>(num_points);
   }
   camera.last_fault = fault_of(camera, row);
+  if (camera.last_fault == FleetFault::too_large && camera.phase == FleetPhase::learning) note_degrees(camera);
   if (camera.last_fault != FleetFault::none) return std::nullopt;
+  camera.last_fault = row.in_part;
   const FleetRotation rotation = rotation_of(camera, row);
   if (!rotation.before.allFinite() || !rotation.after.allFinite()) return std::nullopt;
   bool is_frozen = false;
@@ -185,6 +203,7 @@ std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& given, co
   } else {
     note_row(row, rotation, camera);
   }
+  if (camera.phase == FleetPhase::tracking) note_centre(camera, config);
   if (alarm) {
     camera.last_alarm = alarm->kind;
     camera.alarm_t_s = alarm->t_s;
@@ -254,8 +273,12 @@ std::string sentence_of(const FleetAlarm& alarm) {
 Verdict verdict_of(const FleetCamera& camera) {
   Verdict verdict = verdict_of_state(camera);
   const std::string fault = sentence_of(camera.last_fault);
-  if (fault.empty()) return verdict;
-  verdict.sentence += "; the last row says nothing: " + fault;
+  const std::string centre = camera.phase == FleetPhase::tracking ? centre_sentence(camera) : "";
+  if (fault.empty() && centre.empty()) return verdict;
+  if (!centre.empty()) verdict.sentence += "; " + centre;
+  if (!fault.empty())
+    verdict.sentence +=
+        (says_nothing(camera.last_fault) ? "; the last row says nothing: " : "; of the last row ") + fault;
   if (verdict.state == State::good) verdict.state = State::care;
   return verdict;
 }

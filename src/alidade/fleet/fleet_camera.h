@@ -31,9 +31,11 @@ struct FleetAlarm {
 /// Biometrika 41, 1954.
 [[nodiscard]] std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& row, const FleetConfig& config);
 
-/// Why advance() takes nothing from a row but its number.
+/// Why advance() takes nothing from a row but its number; what of a row in part is in the row.
 [[nodiscard]] FleetFault fault_of(const FleetCamera& camera, const FleetRow& row);
-/// "t is not a number".
+/// Not of what is a fault of a row in part.
+[[nodiscard]] bool says_nothing(FleetFault fault);
+/// "t is not a number of seconds".
 [[nodiscard]] const char* sentence_of(FleetFault fault);
 
 /// What is known of a camera after its last row.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "alidade/fleet/fleet_reading.h"
+
 namespace alidade {
 namespace {
 
@@ -20,7 +22,7 @@ std::vector<KeptRow> kept_rows(const FleetCamera& camera) {
   std::vector<KeptRow> rows(camera.num_buffered);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& from = camera.body.learning.rows[i];
-    rows[i].rotation.before = Eigen::Quaterniond(from[0], from[1], from[2], from[3]).normalized().toRotationMatrix();
+    rows[i].rotation = kept_rotation(camera.source, from.data());
     for (std::size_t k = 0; k < max_fleet_points; ++k) rows[i].px[k] = {from[4 + 2 * k], from[5 + 2 * k]};
   }
   return rows;
@@ -164,6 +166,7 @@ void begin_tracking(const Fit& fit, FleetCamera& camera) {
   camera.sum_nis = camera.sum_dof = 0.0;
   camera.num_gated = 0;
   camera.phase = FleetPhase::tracking;
+  camera.misread = 0;
   camera.body.tracking = tracking;
 }
 
@@ -176,11 +179,14 @@ void learn(FleetCamera& camera, const FleetRow& row, const FleetRotation& rotati
   const Eigen::Quaterniond q(Eigen::Matrix3d(rotation.before * rotation.after));
   auto& kept = camera.body.learning.rows[camera.num_buffered++];
   kept = {static_cast<float>(q.w()), static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z())};
+  if (row.source == FleetSource::head)
+    for (std::size_t i = 0; i < 4; ++i) kept[i] = static_cast<float>(row.rotation[i]);
   for (std::size_t i = 0; i < 2 * max_fleet_points; ++i)
     kept[4 + i] = i < 2 * static_cast<std::size_t>(camera.num_points) ? static_cast<float>(row.px[i]) : NAN;
   if (camera.num_buffered < fleet_learning_rows) return;
   const Fit fit = best_fit(camera, config);
   if (fit.is_good) return begin_tracking(fit, camera);
+  seek_misreading(camera, config);
   for (std::size_t i = 0; 2 * i < fleet_learning_rows; ++i)
     camera.body.learning.rows[i] = camera.body.learning.rows[2 * i];
   camera.num_buffered = fleet_learning_rows / 2;

@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <vector>
 
 #include "alidade/fleet/fleet_camera.h"
 #include "alidade/fleet/fleet_tracking.h"
@@ -173,6 +174,7 @@ TEST(FleetCheckpoint, GoesOnAsIfNothingHadHappened) {
     }
   }
   EXPECT_FALSE(parse_checkpoint(""));
+  EXPECT_FALSE(parse_checkpoint("3:AAAA"));
   EXPECT_FALSE(parse_checkpoint("2:AAAA"));
   EXPECT_FALSE(parse_checkpoint("1:AAAA"));
 }
@@ -218,6 +220,90 @@ TEST(Fleet, NamesWhatItCannotUse) {
   EXPECT_EQ(verdict_of(watched.camera).state, State::care);
   (void)advance(watched.camera, row_of(scene, config, 103), fleet_config);
   EXPECT_EQ(verdict_of(watched.camera).state, State::good);
+}
+
+/// A camera whose rows are all changed in the same way, after 200 of them.
+template <typename Change>
+FleetCamera camera_of_changed(int index, const Change& change) {
+  FleetSceneConfig config;
+  config.event_share = 0.0;
+  const FleetScene scene = draw_fleet_scene(config, 7, index);
+  FleetCamera camera;
+  for (int n = 1; n <= 200; ++n) {
+    FleetRow row = row_of(scene, config, n);
+    change(row);
+    (void)advance(camera, row, fleet_config);
+  }
+  return camera;
+}
+
+/// Units and signs that are wrong are named as observe names them, not "turn it about both axes", which is said where
+/// it did not turn.
+TEST(Fleet, SaysHowItsRowsAreMisread) {
+  using Change = void (*)(FleetRow&);
+  const std::vector<std::pair<Change, const char*>> changes{
+      {[](FleetRow& row) {
+         for (double& each : row.rotation) each *= 180.0 / 3.14159265358979;
+       },
+       "angles are degrees"},
+      {[](FleetRow& row) { row.rotation[0] = -row.rotation[0]; }, "pan counts the other way"},
+      {[](FleetRow& row) { std::swap(row.rotation[0], row.rotation[1]); }, "pan and tilt are exchanged"},
+      {[](FleetRow& row) {
+         for (std::size_t i = 0; i < 12; i += 2) std::swap(row.px[i], row.px[i + 1]);
+       },
+       "x and y of the points are exchanged"},
+      {[](FleetRow& row) { std::swap(row.px[0], row.px[1]); }, "check units and signs"},
+      {[](FleetRow& row) { row.rotation[0] = 0.01; }, "turn it about both axes"}};
+  for (const auto& [change, words] : changes) {
+    for (int i = 0; i < 5; ++i) {
+      const FleetCamera camera = camera_of_changed(i, change);
+      EXPECT_EQ(verdict_of(camera).state, State::refused) << words;
+      EXPECT_NE(verdict_of(camera).sentence.find(words), std::string::npos) << verdict_of(camera).sentence;
+    }
+  }
+}
+
+/// Pixels of another size than the one given: the principal point is not where a lens looks.
+TEST(Fleet, AsksAboutASizeThatIsNotThePixels) {
+  for (int i = 0; i < 5; ++i) {
+    const FleetCamera camera = camera_of_changed(i, [](FleetRow& row) {
+      for (double& each : row.px) each *= 2.0;
+    });
+    EXPECT_EQ(verdict_of(camera).state, State::care);
+    EXPECT_NE(verdict_of(camera).sentence.find("images of the size given"), std::string::npos);
+  }
+}
+
+/// A temperature or a pixel that is no number: the rest of the row is used, and it is said.
+TEST(Fleet, UsesTheRestOfARowAndSaysWhatIsOdd) {
+  std::string fault;
+  EXPECT_EQ(parse_fleet_row(R"({"n":1,"t":1,"pan":0,"tilt":0,"p1x":1,"p1y":2,"temperature_c":null})", fault)->in_part,
+            FleetFault::none);
+  EXPECT_EQ(parse_fleet_row(R"({"n":1,"t":1,"pan":0,"tilt":0,"p1x":1,"p1y":2,"temperature_c":"hot"})", fault)->in_part,
+            FleetFault::temperature);
+  EXPECT_EQ(parse_fleet_row(R"({"n":1,"t":1,"pan":0,"tilt":0,"p1x":"1","p1y":2})", fault)->in_part, FleetFault::pixel);
+  const FleetCamera camera = camera_of_changed(1, [](FleetRow& row) { row.in_part = FleetFault::temperature; });
+  EXPECT_TRUE(estimate_of(camera).has_value);
+  EXPECT_EQ(verdict_of(camera).state, State::care);
+  EXPECT_NE(verdict_of(camera).sentence.find("temperature_c is not a number"), std::string::npos);
+  const auto degrees = parse_fleet_row(R"({"n":1,"t":1,"pan_deg":90,"tilt_deg":-45})", fault);
+  EXPECT_NEAR(degrees->rotation[0], 1.5707963267949, 1e-12);
+  EXPECT_NEAR(degrees->rotation[1], -0.7853981633974, 1e-12);
+}
+
+/// States of the version before go on; a camera that was learning gathers its rows again.
+TEST(FleetCheckpoint, OfTheVersionBeforeGoesOn) {
+  const FleetCamera camera = camera_of_changed(1, [](FleetRow&) {});
+  std::string text = checkpoint_text(camera);
+  text[0] = '2';
+  ASSERT_TRUE(parse_checkpoint(text));
+  EXPECT_EQ(fleet_state_text("c", *parse_checkpoint(text)), fleet_state_text("c", camera));
+  FleetCamera learning;
+  learning.n = learning.num_buffered = 7;
+  text = checkpoint_text(learning);
+  text[0] = '2';
+  EXPECT_EQ(parse_checkpoint(text)->num_buffered, 0);
+  EXPECT_EQ(parse_checkpoint(text)->n, 7);
 }
 
 /// Rows that say nothing, or nonsense: each has its state, and none stops the camera for good.

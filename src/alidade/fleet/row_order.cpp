@@ -20,28 +20,43 @@ std::string rows_word(std::int64_t num) { return fmt::format("{} row{}", num, nu
 
 std::string sentence_of(const FleetNumbers& numbers) {
   std::string text;
-  if (numbers.num_missing > 0) text = rows_word(numbers.num_missing) + " never came";
-  if (numbers.num_restarts == 0) return text;
-  if (!text.empty()) text += "; ";
-  text += "its observer began anew";
-  if (numbers.num_restarts > 1) text += fmt::format(" {} times", numbers.num_restarts);
+  const auto add = [&text](const std::string& words, std::int64_t times) {
+    text += (text.empty() ? "" : "; ") + words;
+    if (times > 1) text += fmt::format(" {} times", times);
+  };
+  if (numbers.num_missing > 0) add(rows_word(numbers.num_missing) + " never came", 1);
+  if (numbers.num_restarts > 0) add("its observer began anew", numbers.num_restarts);
+  if (numbers.num_back > 0)
+    add(fmt::format("its clock went back by {}{:.6g} s", numbers.num_back > 1 ? "up to " : "", numbers.most_back_s),
+        numbers.num_back);
   return text;
 }
 
 std::string numbers_text(const FleetNumbers& numbers) {
-  return fmt::format("{} {} {} {} {} {}", numbers.num_missing, numbers.num_restarts, numbers.begun_at, numbers.read_to,
-                     numbers.first_t_s, numbers.last_t_s);
+  return fmt::format("{} {} {} {} {} {} {} {}", numbers.num_missing, numbers.num_restarts, numbers.begun_at,
+                     numbers.read_to, numbers.num_back, numbers.most_back_s, numbers.first_t_s, numbers.last_t_s);
 }
 
 bool parse_numbers(const std::string& text, FleetNumbers& numbers) {
   std::istringstream in(text);
   std::string first, last;  // "nan" is read by strtod alone
   FleetNumbers read;
-  if (!(in >> read.num_missing >> read.num_restarts >> read.begun_at >> read.read_to >> first >> last)) return false;
+  in >> read.num_missing >> read.num_restarts >> read.begun_at >> read.read_to >> read.num_back >> read.most_back_s;
+  if (!(in >> first >> last)) return false;
   read.first_t_s = std::strtod(first.c_str(), nullptr);
   read.last_t_s = std::strtod(last.c_str(), nullptr);
   numbers = read;
   return true;
+}
+
+void note_time(const FleetRow& row, FleetNumbers& numbers) {
+  if (row.n == 1) numbers.first_t_s = row.t_s;
+  if (!std::isfinite(row.t_s)) return;
+  if (row.t_s < numbers.last_t_s) {
+    ++numbers.num_back;
+    numbers.most_back_s = std::max(numbers.most_back_s, numbers.last_t_s - row.t_s);
+  }
+  numbers.last_t_s = row.t_s;
 }
 
 bool FleetRowOrder::begins_anew(const FleetRow& row) const {
@@ -65,8 +80,8 @@ std::uint64_t FleetRowOrder::first_waiting_place() const {
 void FleetRowOrder::take(const FleetRow& row, std::int64_t num_missing, bool begins_anew, std::vector<Ready>& ready) {
   n_ = row.n;
   numbers_.num_missing = std::min(numbers_.num_missing + std::min(num_missing, most_missing), most_missing);
-  if (row.n == 1) numbers_.first_t_s = row.t_s;
-  if (std::isfinite(row.t_s)) numbers_.last_t_s = row.t_s;
+  if (begins_anew) numbers_.last_t_s = std::numeric_limits<double>::quiet_NaN();
+  note_time(row, numbers_);
   ready.push_back({row, num_missing, begins_anew});
 }
 

@@ -16,10 +16,14 @@ struct FleetNumbers {
   std::int64_t num_restarts = 0;                                ///< How often the observer began anew.
   std::uint64_t begun_at = 0;                                   ///< Place in the stream of the first row since it did.
   std::uint64_t read_to = 0;                                    ///< Place of the last row that was read.
+  std::int64_t num_back = 0;                                    ///< How often t was less than in the row before.
+  double most_back_s = 0.0;                                     ///< By how much at most.
   double first_t_s = std::numeric_limits<double>::quiet_NaN();  ///< Of row 1; NaN: not known.
   double last_t_s = std::numeric_limits<double>::quiet_NaN();   ///< Of the last row in order.
 };
-/// "2 rows never came; its observer began anew"; empty: nothing of that kind.
+/// Of the next row in order.
+void note_time(const FleetRow& row, FleetNumbers& numbers);
+/// "2 rows never came; its observer began anew; its clock went back by 3600 s"; empty: nothing of that kind.
 [[nodiscard]] std::string sentence_of(const FleetNumbers& numbers);
 /// As one line, and back; false where it is none.
 [[nodiscard]] std::string numbers_text(const FleetNumbers& numbers);

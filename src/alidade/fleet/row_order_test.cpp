@@ -101,6 +101,13 @@ TEST(FleetRowOrder, IsNotMisledBySingleRows) {
   EXPECT_EQ(sentence_of(rows.order.numbers()), "");
 }
 
+TEST(FleetRowOrder, SaysThatAClockWentBack) {
+  Ordered rows;
+  for (int n = 1; n <= 200; ++n) (void)rows.add(n, n <= 100 ? n : n - 3600);
+  EXPECT_EQ(rows.ready.size(), 200u);
+  EXPECT_EQ(sentence_of(rows.order.numbers()), "its clock went back by 3599 s");
+}
+
 /// A worker that ends anywhere, and another that reads from the first row that waited (or earlier): the same.
 TEST(FleetRowOrder, GoesOnFromWhatIsStored) {
   std::vector<FleetRow> stream;

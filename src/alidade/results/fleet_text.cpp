@@ -10,12 +10,13 @@
 #include <nlohmann/json.hpp>
 
 #include "alidade/files/json_value.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/results/result_document.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::string_view version = "2:";  // of a checkpoint
+constexpr std::string_view version = "3:", version_before = "2:";  // of a checkpoint
 constexpr double largest = 1e12;
 
 double number_in(const nlohmann::json& json, const char* name) {
@@ -25,11 +26,23 @@ double number_in(const nlohmann::json& json, const char* name) {
   return std::abs(value) <= largest ? value : std::numeric_limits<double>::quiet_NaN();
 }
 
+/// An angle, or the same in degrees where its name ends in _deg.
+double angle_in(const nlohmann::json& json, const std::string& name) {
+  if (json.contains(name)) return number_in(json, name.c_str());
+  return degree * number_in(json, (name + "_deg").c_str());
+}
+
+/// Neither a number, nor said not to be there.
+bool is_odd(const nlohmann::json& json, const char* name) {
+  const auto found = json.find(name);
+  return found != json.end() && !found->is_null() && !std::isfinite(number_in(json, name));
+}
+
 void read_rotation(const nlohmann::json& json, FleetRow& row) {
-  if (json.contains("pan")) {
-    const double roll = json.contains("roll") ? number_in(json, "roll") : 0.0;
+  if (json.contains("pan") || json.contains("pan_deg")) {
+    const bool has_roll = json.contains("roll") || json.contains("roll_deg");
     row.source = FleetSource::head;
-    row.rotation = {number_in(json, "pan"), number_in(json, "tilt"), roll, 0.0};
+    row.rotation = {angle_in(json, "pan"), angle_in(json, "tilt"), has_roll ? angle_in(json, "roll") : 0.0, 0.0};
   } else if (json.contains("qw")) {
     row.source = FleetSource::attitude;
     row.rotation = {number_in(json, "qw"), number_in(json, "qx"), number_in(json, "qy"), number_in(json, "qz")};
@@ -72,12 +85,14 @@ std::optional<FleetRow> parse_fleet_row(std::string_view payload, std::string& f
     }
     row.t_s = number_in(json, "t");
     row.temperature_c = number_in(json, "temperature_c");
+    if (is_odd(json, "temperature_c")) row.in_part = FleetFault::temperature;
     read_rotation(json, row);
     row.px.fill(std::numeric_limits<double>::quiet_NaN());
     static constexpr std::array<const char*, 2 * max_fleet_points> names{"p1x", "p1y", "p2x", "p2y", "p3x", "p3y",
                                                                          "p4x", "p4y", "p5x", "p5y", "p6x", "p6y"};
     for (std::size_t i = 0; i < names.size(); ++i) {
       row.px[i] = number_in(json, names[i]);
+      if (is_odd(json, names[i])) row.in_part = FleetFault::pixel;
       if (std::isfinite(row.px[i])) row.num_points = static_cast<int>(i / 2 + 1);
     }
     return row;
@@ -151,7 +166,9 @@ std::string checkpoint_text(const FleetCamera& camera) {
 
 std::optional<FleetCamera> parse_checkpoint(std::string_view text) {
   constexpr std::size_t num_digits = (sizeof(FleetCamera) + 2) / 3 * 4;
-  if (!text.starts_with(version) || text.size() != version.size() + num_digits) return std::nullopt;
+  const bool is_before = text.starts_with(version_before);
+  if (!text.starts_with(version) && !is_before) return std::nullopt;
+  if (text.size() != version.size() + num_digits) return std::nullopt;
   text.remove_prefix(version.size());
   std::array<unsigned char, sizeof(FleetCamera) + 3> bytes{};
   for (std::size_t i = 0, at = 0; i < text.size(); i += 4) {
@@ -166,6 +183,12 @@ std::optional<FleetCamera> parse_checkpoint(std::string_view text) {
   }
   FleetCamera camera;
   std::memcpy(static_cast<void*>(&camera), bytes.data(), sizeof camera);
+  if (is_before) camera.misread = camera.off_centre_percent = camera.off_centre_axis = 0;
+  if (is_before && camera.phase == FleetPhase::learning) {  // it kept its rows otherwise: they are gathered again
+    camera.num_buffered = 0;
+    camera.stride = 1;
+    camera.since_kept = 0;
+  }
   return camera;
 }
 

@@ -11,9 +11,9 @@
 namespace alidade {
 
 /// A row as a camera says it on cam.ID.obs: JSON, or CBOR, an object with n = 1, 2, 3 … and the columns of a rotation
-/// log: t, pan and tilt (and roll), or qw qx qy qz, or omega_x omega_y (omega_z), and p1x, p1y, p2x, …; null or no
-/// member: not seen; temperature_c, where it is measured. None, and why, for what has no n; what has a number but is
-/// otherwise none of these is a row that says nothing.
+/// log: t, pan and tilt (and roll; or pan_deg, tilt_deg), or qw qx qy qz, or omega_x omega_y (omega_z), and p1x, p1y,
+/// p2x, …; null or no member: not seen; temperature_c, where it is measured. None, and why, for what has no n; what has
+/// a number but is otherwise none of these is a row that says nothing.
 [[nodiscard]] std::optional<FleetRow> parse_fleet_row(std::string_view payload, std::string& fault);
 [[nodiscard]] std::string fleet_row_text(const FleetRow& row);
 /// The n-th row of a simulated camera.

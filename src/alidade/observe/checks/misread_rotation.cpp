@@ -29,10 +29,15 @@ void exchange(RotationRow& row) {
   std::swap(row.rate_rad_per_s.x(), row.rate_rad_per_s.y());
 }
 
+const Misreading exchanged_pixels{"x and y of the points are exchanged", [](RotationRow& row) {
+                                    for (Eigen::Vector2d& px : row.px) std::swap(px.x(), px.y());
+                                  }};
+
 std::vector<Misreading> misreadings_of(RotationSource source) {
   if (source == RotationSource::attitude) {
     return {{"the quaternions are of the base in the camera, not of the camera in the base",
-             [](RotationRow& row) { row.base_from_cam = row.base_from_cam.conjugate(); }}};
+             [](RotationRow& row) { row.base_from_cam = row.base_from_cam.conjugate(); }},
+            exchanged_pixels};
   }
   if (source == RotationSource::head) {
     return {{"pan counts the other way (to the right), or the image is mirrored left to right", scaled(-1, 1, 1)},
@@ -46,7 +51,8 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
              }},
             {"the angles are half of what the head turns", scaled(2, 2, 2)},
             {"the angles are twice what the head turns", scaled(0.5, 0.5, 0.5)},
-            {"the angles are degrees: name the columns pan_deg, tilt_deg", scaled(degree, degree, degree)}};
+            {"the angles are degrees: name the columns pan_deg, tilt_deg", scaled(degree, degree, degree)},
+            exchanged_pixels};
   }
   return {{"ω_y counts the other way, or the image is mirrored left to right", scaled(1, -1, -1)},
           {"ω_x counts the other way, or the image is mirrored top to bottom", scaled(-1, 1, -1)},
@@ -55,7 +61,8 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
           {"ω_x and ω_y are exchanged", exchange},
           {"the rates are half of what the camera turns", scaled(2, 2, 2)},
           {"the rates are twice what the camera turns", scaled(0.5, 0.5, 0.5)},
-          {"the rates are degrees per second", scaled(degree, degree, degree)}};
+          {"the rates are degrees per second", scaled(degree, degree, degree)},
+          exchanged_pixels};
 }
 
 constexpr std::size_t max_frames = 150;
@@ -116,6 +123,12 @@ bool may_be_misread(const ObserveSolution& report) {
   const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_rejected);
   return report.status == Status::ok &&
          (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_rejected) > many * seen);
+}
+
+std::vector<std::string> misreading_words(RotationSource source) {
+  std::vector<std::string> words;
+  for (const Misreading& misreading : misreadings_of(source)) words.emplace_back(misreading.words);
+  return words;
 }
 
 Misread misread_rotation(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,

@@ -62,6 +62,8 @@ struct Misread {
   bool explains_all = false;  ///< With it, the residuals are no larger than a detector's noise.
 };
 
+/// The ways in which such a rotation is misread; the words of a Misread are among them.
+[[nodiscard]] std::vector<std::string> misreading_words(RotationSource source);
 /// Whether the result suggests that the rotation is misread; and the misreading: signs, axes, degrees, inverse
 /// quaternions, whichever fits the pixels clearly better.
 [[nodiscard]] bool may_be_misread(const ObserveSolution& report);

@@ -267,6 +267,14 @@ TEST_F(HeadCommand, StandsAfterCtrlC) {
   });
 }
 
+TEST_F(HeadCommand, SaysThatTheHeadIsStoppedAfterCtrlC) {
+  const testing::Outcome outcome =
+      testing::run_program({ALIDADE_EXECUTABLE, "head", "sim://?rate=5", "--identify", "--move", "--out", path("out")},
+                           "", testing::interrupt_after(std::chrono::milliseconds(2500)));
+  EXPECT_EQ(outcome.code, 130) << outcome.err;
+  EXPECT_NE(outcome.err.find("interrupted; the head is stopped; nothing written"), std::string::npos) << outcome.err;
+}
+
 TEST_F(HeadCommand, WhatWasFollowedUntilCtrlCIsAResult) {
   write_file(
       path("camera.yaml"),
@@ -281,6 +289,7 @@ TEST_F(HeadCommand, WhatWasFollowedUntilCtrlCIsAResult) {
   EXPECT_NE(outcome.err.find("interrupted"), std::string::npos) << outcome.err;
   const auto document = nlohmann::json::parse(read_file(path("out") + "/result.json"));
   EXPECT_GT(document["data"]["follow"]["t_s"].size(), 20u);
+  EXPECT_EQ(document["verdict"]["state"], "care");  // no run that ended as it should
   EXPECT_TRUE(std::filesystem::exists(path("out") + "/follow.csv"));
   EXPECT_FALSE(std::filesystem::exists(path("out") + "/so-far"));
 }

@@ -273,9 +273,14 @@ void judge(HeadFollowing& result, double shorter_side_px) {
 
 /// What broke it off is said before what was seen until then.
 void heed_break(HeadFollowing& result) {
-  if (result.is_interrupted)
+  if (result.is_interrupted) {
     result.verdict.sentence =
         fmt::format("interrupted after {:.1f} s; {}", result.head_time_s, result.verdict.sentence);
+    result.verdict.checks.push_back({.name = "interrupted",
+                                     .state = State::care,
+                                     .text = "ended by hand: the exit code of the command is that of the interrupt"});
+    if (result.verdict.state == State::good) result.verdict.state = State::care;
+  }
   if (result.fault.empty()) return;
   result.verdict.state = State::refused;
   result.verdict.exit_code = ExitCode::undetermined;

@@ -111,11 +111,31 @@ class Experiment {
     next_s_ = head_.now_s() + question_s;
   }
   void move_to(const Eigen::Vector2d& target) {
+    if (still_s_ > quick_still_s) ask_for(0.67 * still_s_ * draw());  // no command keeps step with the renewals
     const Eigen::Vector2d before = last().pan_tilt_rad;
     const std::size_t first = log(0).readings.size();
     send(target);
-    ask_until_rest(patience_s_, 0.35);
+    ask_until_rest(patience_s_, still_s_);
+    heed_renewals(first);
     for (int i = 0; i < 2; ++i) heed_standing(i, before[i], first);
+  }
+  /// A reading may be renewed less often than it is asked (a camera's cached status): rest is only known after longer
+  /// than that. Until a move has shown how it is, long.
+  void heed_renewals(std::size_t first) {
+    constexpr int few = 4;
+    constexpr double times = 1.5;
+    for (int i = 0; i < 2; ++i) {
+      const std::vector<PositionerReading>& readings = log(i).readings;
+      int changes = 0;
+      double last_s = 0.0;
+      for (std::size_t k = std::max<std::size_t>(first, 1); k < readings.size(); ++k) {
+        if (readings[k].angle_rad == readings[k - 1].angle_rad) continue;
+        if (++changes > 1) held_s_ = std::max(held_s_, readings[k].t_s - last_s);
+        last_s = readings[k].t_s;
+      }
+      shows_renewals_ = shows_renewals_ || changes >= few;
+    }
+    still_s_ = shows_renewals_ ? std::clamp(times * held_s_, quick_still_s, slow_still_s) : slow_still_s;
   }
   /// A reading that stands through several commands, each far beyond any dead band, is none.
   void heed_standing(int axis, double before, std::size_t first) {
@@ -297,7 +317,10 @@ class Experiment {
   MovingHead& head_;
   HeadIdentification& result_;
   const Progress& progress_;
-  double begin_s_ = 0.0, next_s_ = 0.0, chance_ = 0.3, patience_s_ = 0.7;
+  static constexpr double quick_still_s = 0.35, slow_still_s = 1.2;
+  double begin_s_ = 0.0, next_s_ = 0.0, chance_ = 0.3, patience_s_ = 0.7, still_s_ = slow_still_s;
+  double held_s_ = 0.0;  ///< The longest that a reading stood between two changes in one move.
+  bool shows_renewals_ = false;
   std::array<int, 2> num_standing_{};
   Eigen::Vector2d start_, low_, high_, window_low_, window_high_, toward_, slow_rate_;
 };

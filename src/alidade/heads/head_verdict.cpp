@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/heads/head_identify.h"
 
@@ -61,6 +62,52 @@ void check_grid(const PositionerLog& log, const PositionerFit& fit, const std::s
   checks.push_back({axis + " steps", State::bad,
                     fmt::format("{} moves in steps of {:.3g}°: commands between are rounded", axis, grid / degree),
                     grid / degree, coarse_rad / degree, "°", ""});
+}
+
+/// Where it came to rest, beside where it was sent: by more than any of its own flaws, so often.
+void check_rests(const PositionerLog& log, const PositionerFit& fit, const std::string& axis,
+                 std::vector<Check>& checks) {
+  constexpr double far_rad = 1.0 * degree, rest_s = 0.3;
+  const double limit = far_rad + 2.0 * fit.resolution.value + fit.backlash.value + fit.dead_band.value;
+  std::vector<double> off;
+  for (std::size_t k = 0; k < log.commands.size(); ++k) {
+    const double end_s = k + 1 < log.commands.size() ? log.commands[k + 1].t_s : 1e300;
+    const auto next = std::ranges::lower_bound(log.readings, end_s, {}, &PositionerReading::t_s);
+    if (next == log.readings.begin() || (next - 1)->t_s - log.commands[k].t_s < 2.0 * rest_s) continue;
+    const PositionerReading& last = *(next - 1);
+    const bool rests = std::all_of(log.readings.begin(), next, [&](const PositionerReading& each) {
+      return each.t_s < last.t_s - rest_s || each.angle_rad == last.angle_rad;
+    });
+    if (rests) off.push_back(last.angle_rad - log.commands[k].target_rad);
+  }
+  const bool is_explained = std::ranges::any_of(
+      checks, [&](const Check& check) { return check.state == State::bad && check.name.starts_with(axis + " "); });
+  if (off.size() < 5 || is_explained) return;
+  const double usual = median_of(off);
+  double most = 0.0;
+  std::size_t beside = 0;
+  for (const double each : off) {
+    most = std::max(most, std::abs(each - usual));
+    beside += std::abs(each - usual) > limit;
+  }
+  if (beside < 2) return;
+  checks.push_back(
+      {axis + " rests", State::bad,
+       fmt::format("{} came to rest up to {:.2g}° beside where it was sent, after {} of {} commands: somebody "
+                   "else moves it, or it does not hold",
+                   axis, most / degree, beside, off.size()),
+       most / degree, limit / degree, "°", ""});
+}
+
+/// Readings that are older than they seem.
+void check_renewal(const PositionerFit& fit, const std::string& axis, std::vector<Check>& checks) {
+  if (fit.renewal_s == 0.0) return;
+  checks.push_back(
+      {axis + " renewal", State::care,
+       fmt::format("{} is read anew every {:.2g} s only (a cached status): its rate, acceleration and time "
+                   "constant are of readings that are up to so old",
+                   axis, fit.renewal_s),
+       fit.renewal_s, 0.15, "s", ""});
 }
 
 /// The options of the axes that lack room; where their range is the head's own, that no option helps.
@@ -149,6 +196,8 @@ void judge_axis(const HeadIdentification& identified, std::size_t i, Verdict& ve
   const std::string axis = head_axis_names[i], missing = not_given(fit);
   check_readings(fit, axis, verdict.checks);
   check_grid(identified.logs[i], fit, axis, verdict.checks);
+  check_rests(identified.logs[i], fit, axis, verdict.checks);
+  check_renewal(fit, axis, verdict.checks);
   verdict.sentence += fmt::format("{}{} follows at up to {:.4g}°/s, {:.3g} ms late", i == 0 ? "" : "; ", axis,
                                   fit.rate.value / degree, 1e3 * fit.latency.value);
   if (!fit.reached_rate) verdict.sentence += ", and had no way to reach its largest rate";
@@ -162,7 +211,8 @@ void sum_up(Verdict& verdict) {
   std::string named;
   for (const Check& check : verdict.checks) {
     if (check.state == State::good) continue;
-    const bool is_named = check.state == State::bad || check.name.ends_with("resolution");
+    const bool is_named =
+        check.state == State::bad || check.name.ends_with("resolution") || check.name.ends_with("renewal");
     if (is_named) named += (named.empty() ? "" : "; ") + check.text;
     if (check.state == State::bad) {
       verdict.state = State::bad;

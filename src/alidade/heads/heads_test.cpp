@@ -17,7 +17,7 @@ namespace alidade {
 namespace {
 
 /// Writes down its commands, and passes them on.
-class WatchedHead final : public HeadDevice {
+class WatchedHead : public HeadDevice {
  public:
   explicit WatchedHead(const std::string& url) : head_(open_head(url)) {}
   [[nodiscard]] HeadLimits limits() override { return head_->limits(); }
@@ -248,6 +248,57 @@ TEST(Heads, HonestOnesAreNotAccused) {
   EXPECT_TRUE(survey.zoom.has_zoom);
   EXPECT_TRUE(survey.verdict.ok()) << survey.verdict.sentence;
   EXPECT_NEAR(*zooms->zoom(), 0.0, 1e-12);  // it is back
+}
+
+/// A head that renews what it reads when it is asked, half a second after the last time at the earliest.
+class CachingHead final : public WatchedHead {
+ public:
+  using WatchedHead::WatchedHead;
+  [[nodiscard]] HeadPosition position() override {
+    const HeadPosition now = WatchedHead::position();
+    if (now.t_s - kept_.t_s > 0.5) kept_ = now;
+    return {now.t_s, now.wait_s, kept_.pan_tilt_rad};
+  }
+
+ private:
+  HeadPosition kept_;
+};
+
+TEST(Heads, ACachedPositionIsNamedAndItsLatencyIsThatOfTheFirstChange) {
+  CachingHead head("sim://?rate=30&accel=90&latency=0.04&clock=free");
+  const HeadIdentification given =
+      identify_head(head, {Eigen::Vector2d(-40.0, -20.0) * degree, Eigen::Vector2d(40.0, 20.0) * degree});
+  EXPECT_EQ(given.verdict.state, State::care) << given.verdict.sentence;
+  EXPECT_NE(given.verdict.sentence.find("cached"), std::string::npos) << given.verdict.sentence;
+  for (const PositionerFit& axis : given.axes) {
+    EXPECT_NEAR(axis.gain, 1.0, 1e-3);
+    EXPECT_NEAR(axis.renewal_s, 0.53, 0.05);
+    expect_within(axis.latency, 0.04 + 0.26, "latency");
+  }
+}
+
+/// A head that somebody else moves by 8° every five seconds.
+class SharedHead final : public WatchedHead {
+ public:
+  using WatchedHead::WatchedHead;
+  [[nodiscard]] HeadPosition position() override {
+    const HeadPosition now = WatchedHead::position();
+    if (now.t_s - moved_s_ < 5.0) return now;
+    moved_s_ = now.t_s;
+    WatchedHead::command(now.pan_tilt_rad + Eigen::Vector2d(now.pan_tilt_rad[0] > 0.0 ? -8.0 : 8.0, 0.0) * degree);
+    return now;
+  }
+
+ private:
+  double moved_s_ = 0.0;
+};
+
+TEST(Heads, WhoeverElseMovesItIsNamed) {
+  SharedHead head("sim://?rate=30&accel=90&latency=0.04&clock=free");
+  const HeadIdentification given =
+      identify_head(head, {Eigen::Vector2d(-40.0, -20.0) * degree, Eigen::Vector2d(40.0, 20.0) * degree});
+  EXPECT_EQ(given.verdict.exit_code, ExitCode::not_trusted) << given.verdict.sentence;
+  EXPECT_NE(given.verdict.sentence.find("pan came to rest up to"), std::string::npos) << given.verdict.sentence;
 }
 
 TEST(Heads, UnknownKeysAreNamedWithThoseThereAre) {

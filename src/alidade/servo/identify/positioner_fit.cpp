@@ -149,6 +149,7 @@ void fill_repeatability(const PositionerLog& log, double step, PositionerFit& fi
 
 /// Where it rests by what it was commanded: a line.
 void fill_gain(const PositionerLog& log, PositionerFit& fit) {
+  constexpr double rested_s = 0.5;
   std::vector<Eigen::Vector2d> pairs;
   for (std::size_t i = 0; i + 1 < log.commands.size(); ++i) {
     const double until = log.commands[i + 1].t_s;
@@ -158,7 +159,9 @@ void fill_gain(const PositionerLog& log, PositionerFit& fit) {
       before = last;
       last = &reading;
     }
-    if (last != nullptr && before != nullptr && last->angle_rad == before->angle_rad)
+    // A reading that is cached stands, too, where the axis moves.
+    if (last != nullptr && before != nullptr && last->angle_rad == before->angle_rad &&
+        last->t_s - log.commands[i].t_s > rested_s)
       pairs.emplace_back(log.commands[i].target_rad, last->angle_rad);
   }
   if (pairs.size() < 3) return;
@@ -385,6 +388,7 @@ PositionerFit fit_positioner(const PositionerLog& log) {
   fill_rate(positioner_params(found.theta, fit.dead_band.value), found.sigma, fit);
   fill_tested(problem, found, step, fit);
   fill_latency(log, problem, found, fit);
+  heed_renewal(log, step, fit);
   fit.offset_rad = found.theta[P::offset];
   fit.sigma_offset_rad = found.sigma[P::offset];
   fill_residuals(problem, found.theta, fit);

@@ -63,4 +63,8 @@ class PositionerProblem {
   double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0, threshold_ = 4.0;
 };
 
+/// Of readings that are renewed at no regular times the model cannot know how old each is; when the first change is
+/// read is seen, of commands that came at any phase.
+void heed_renewal(const PositionerLog& log, double step_rad, PositionerFit& fit);
+
 }  // namespace alidade

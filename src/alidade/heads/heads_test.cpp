@@ -274,6 +274,7 @@ TEST(Heads, ACachedPositionIsNamedAndItsLatencyIsThatOfTheFirstChange) {
     EXPECT_NEAR(axis.gain, 1.0, 1e-3);
     EXPECT_NEAR(axis.renewal_s, 0.53, 0.05);
     expect_within(axis.latency, 0.04 + 0.26, "latency");
+    expect_within(axis.rate, 30.0 * degree, "rate");
   }
 }
 

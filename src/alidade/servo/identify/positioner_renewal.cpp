@@ -37,21 +37,30 @@ void heed_renewal(const PositionerLog& log, double step_rad, PositionerFit& fit)
   fit.renewal_s = renewal_s(log, step_rad);
   if (fit.renewal_s == 0.0) return;
   std::vector<double> waits;
+  double sum_span2 = 0.0;  // of what moves took, each known but for its ends
   for (std::size_t k = 0; k < log.commands.size(); ++k) {
     const double from_s = log.commands[k].t_s;
     const double until_s = k + 1 < log.commands.size() ? log.commands[k + 1].t_s : 1e300;
     if (until_s - from_s < alone_s || (k > 0 && from_s - log.commands[k - 1].t_s < alone_s)) continue;
     auto next = std::ranges::upper_bound(log.readings, from_s, {}, &PositionerReading::t_s);
     if (next == log.readings.begin()) continue;
-    const double before = (next - 1)->angle_rad;
-    while (next != log.readings.end() && next->t_s < until_s && next->angle_rad == before) ++next;
-    if (next != log.readings.end() && next->t_s < until_s) waits.push_back(next->t_s - from_s);
+    double before = (next - 1)->angle_rad, first_s = until_s, last_s = from_s;
+    for (; next != log.readings.end() && next->t_s < until_s; before = (next++)->angle_rad) {
+      if (next->angle_rad == before) continue;
+      first_s = std::min(first_s, next->t_s);
+      last_s = next->t_s;
+    }
+    if (last_s == from_s) continue;
+    waits.push_back(first_s - from_s);
+    sum_span2 += (last_s - first_s) * (last_s - first_s);
   }
   if (waits.size() < 3) return;
   double mean = 0.0, sum2 = 0.0;
   const double n = static_cast<double>(waits.size());
   for (const double each : waits) mean += each / n;
   for (const double each : waits) sum2 += (each - mean) * (each - mean);
+  if (sum_span2 > 0.0)
+    fit.rate.sigma = std::hypot(fit.rate.sigma, fit.rate.value * fit.renewal_s / std::sqrt(6.0 * sum_span2));
   fit.latency = {mean, std::hypot(std::sqrt(sum2 / (n - 1.0) / n), fit.latency.sigma), true, 0.0};
 }
 

@@ -361,6 +361,19 @@ TEST(ObserveCauses, AMisreadHeadIsNamed) {
   }
 }
 
+/// Readings are tried without distortion and mounting: what a solution explains with them was not misread.
+TEST(ObserveCauses, WhatASolutionExplainsBetterIsNotMisread) {
+  const RotationLog log = log_in(with_faults({.angle_scale = 0.5}), 1);
+  ObserveSetup config = auto_config(ObserveMethod::batch);
+  config.estimate_auto = false;
+  ObserveSolution report = solve_intrinsics(log, config);
+  ASSERT_EQ(report.status, ObserveSolution::Status::ok);
+  report.sigma_px = 10.0;
+  EXPECT_NE(misread_rotation(log, config, report, {}).words, "");
+  report.sigma_px = 0.3;  // the points' noise
+  EXPECT_EQ(misread_rotation(log, config, report, {}).words, "");
+}
+
 /// Where a σ of the scale keeps it from being estimated all else is freed, until nothing is asked for and nothing
 /// determined.
 TEST(ObserveCauses, AVagueAnswerMayBeMisread) {

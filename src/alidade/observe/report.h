@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <string>
@@ -136,6 +137,12 @@ struct ObserveReport {
   std::optional<MatchedPhotos> found_matches;  ///< Where they were not given.
   std::size_t num_unreadable = 0;
 };
+
+/// The pixels tell next to nothing of it, though of fx: value and σ are mostly what was assumed.
+[[nodiscard]] inline bool is_assumed(const ObserveReport& report, const ObservedQuantity& quantity) {
+  constexpr double mostly = 2.0;  // the bound counts no assumption
+  return std::isfinite(report.quantities.front().bound) && !(quantity.bound < mostly * quantity.sigma_model);
+}
 
 /// The word for an event in files: start, burst, slip, zoom, zoom_end, restart, gap; empty for none.
 [[nodiscard]] std::string_view event_name(ObserveEvent event);

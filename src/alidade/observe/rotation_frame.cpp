@@ -78,11 +78,15 @@ void MotionReader::advance_by_attitude(const Eigen::Quaterniond& base_from_cam, 
     const Eigen::Quaterniond now_from_last = base_from_cam.conjugate() * last_base_from_cam_;
     cam_from_start_ = (now_from_last * cam_from_start_).normalized();
     if (frame.dt_s > 0.0) frame.mean_rate_rad_per_s = -log_so3(now_from_last.normalized()) / frame.dt_s;
-    if (has_before_ && frame.dt_s > 0.0 && last_dt_s_ > 0.0) {
+    // Over a longer gap it may have stood, or turned there and back: nothing says how fast it turns at its ends.
+    const bool is_far = frame.dt_s > max_gap_s_;
+    if (has_before_ && frame.dt_s > 0.0 && last_dt_s_ > 0.0 && !is_far && last_dt_s_ <= max_gap_s_) {
       const Eigen::Vector3d change = frame.mean_rate_rad_per_s - last_mean_rate_;
       frame.acceleration_rad_per_s2 = 2.0 * change / (frame.dt_s + last_dt_s_);
     }
-    frame.rate_rad_per_s = frame.mean_rate_rad_per_s + 0.5 * frame.dt_s * frame.acceleration_rad_per_s2;
+    frame.rate_rad_per_s =
+        is_far ? Eigen::Vector3d::Zero()
+               : Eigen::Vector3d(frame.mean_rate_rad_per_s + 0.5 * frame.dt_s * frame.acceleration_rad_per_s2);
     last_mean_rate_ = frame.mean_rate_rad_per_s;
     last_dt_s_ = frame.dt_s;
     has_before_ = true;

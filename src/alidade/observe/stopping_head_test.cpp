@@ -168,5 +168,29 @@ TEST(StoppingHead, AZoomIsFollowedWhereRowsSeeNothingOrAreMissing) {
   }
 }
 
+/// Points that are seen at rest alone tell nothing of how late the images are: it was 0 ± 0.01 s from the mean rate of
+/// the moves between.
+TEST(StoppingHead, ADelayThatNothingShowsIsSaidToBeAssumed) {
+  RotationLog log = log_of(1, {0.0, 0.05});
+  constexpr int rows_a_turn = rows_a_stop + rows_a_move, middle = rows_a_stop / 2;
+  std::vector<RotationRow> rows;
+  for (std::size_t k = 0; k < log.rows.size(); ++k) {
+    const int from_middle = static_cast<int>(k) % rows_a_turn - middle;
+    if (std::abs(from_middle) > 1) continue;
+    rows.push_back(log.rows[k]);
+    if (from_middle != 0) rows.back().px.assign(log.num_points, Eigen::Vector2d::Constant(not_seen));
+  }
+  log.rows = rows;
+  ObserveConfig config{.width_px = width, .height_px = height};
+  config.estimate = {"delay"};
+  const ObserveReport report = observe(log, config);
+  ASSERT_EQ(report.quantities.size(), 5u) << report.verdict.sentence;
+  EXPECT_FALSE(is_assumed(report, report.quantities[0]));
+  EXPECT_TRUE(is_assumed(report, report.quantities[4]));
+  const auto check = std::ranges::find(report.verdict.checks, "determined", &Check::name);
+  ASSERT_NE(check, report.verdict.checks.end());
+  EXPECT_THAT(check->text, HasSubstr("do not determine delay_s"));
+}
+
 }  // namespace stopping_head
 }  // namespace alidade

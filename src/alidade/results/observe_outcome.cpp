@@ -18,8 +18,10 @@ namespace {
 
 void say_log(const ObserveReport& report, std::vector<std::string>& lines) {
   for (const ObservedQuantity& quantity : report.quantities) {
-    const std::string bound =
-        std::isfinite(quantity.bound) ? fmt::format("; this log's bound {:.2g}", 3.0 * quantity.bound) : "";
+    const std::string bound = is_assumed(report, quantity) ? "; assumed, these pixels do not determine it"
+                              : std::isfinite(quantity.bound)
+                                  ? fmt::format("; this log's bound {:.2g}", 3.0 * quantity.bound)
+                                  : "";
     lines.push_back(
         fmt::format("{:<11} {:.6g} ± {:.2g}   (3σ{})", quantity.name, quantity.value, 3.0 * quantity.sigma, bound));
   }

@@ -106,10 +106,16 @@ bool motion_suffices(const ObserveMotion& motion) {
   return motion.span_rad >= min_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
 }
 
+bool rejects_many(const ObserveSolution& report) {
+  constexpr double many = 0.2;
+  const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_rejected);
+  return static_cast<double>(report.pixels_rejected) > many * seen;
+}
+
 }  // namespace
 
 bool may_be_misread(const ObserveSolution& report) {
-  constexpr double max_ordinary_px = 2.0, many = 0.2;
+  constexpr double max_ordinary_px = 2.0;
   using Status = ObserveSolution::Status;
   constexpr double ask_beyond = 5.0;
   const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
@@ -120,9 +126,7 @@ bool may_be_misread(const ObserveSolution& report) {
   for (const std::size_t axis : {0U, 1U})
     if (report.status == Status::ok && report.quantities[axis].sigma > vague * report.quantities[axis].value)
       return motion_suffices(report.motion);
-  const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_rejected);
-  return report.status == Status::ok &&
-         (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_rejected) > many * seen);
+  return report.status == Status::ok && (report.sigma_px > max_ordinary_px || rejects_many(report));
 }
 
 std::vector<std::string> misreading_words(RotationSource source) {
@@ -136,7 +140,11 @@ Misread misread_rotation(const RotationLog& log, const ObserveSetup& config, con
   if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return {.is_sought = true};
   constexpr double max_px = 3.0, clearly = 0.3;            // of the noise as the log is read
   constexpr double ordinary_px = 1.0, beyond_doubt = 0.1;  // no cause is tried beside it
-  const double as_read = explanation_of(log, config, report.scale, progress).noise_px;
+  // An explanation knows no distortion and no mounting: what the solution explains with them is explained as it is
+  // read.
+  const bool is_explained = report.status == ObserveSolution::Status::ok && !rejects_many(report);
+  const double as_read = std::min(explanation_of(log, config, report.scale, progress).noise_px,
+                                  is_explained ? report.sigma_px : std::numeric_limits<double>::infinity());
   Misread best{.is_sought = true};
   double least = std::min(max_px, clearly * as_read);
   for (const Misreading& misreading : misreadings_of(log.source)) {

@@ -309,6 +309,16 @@ void note_ungiven(const ObserveSolution& report, const std::vector<RotationError
                          0.0, 0.0, "", "residuals"});
 }
 
+void note_assumed(ObserveSolution& report) {
+  std::string names;
+  for (const ObservedQuantity& quantity : report.quantities)
+    if (is_assumed(report, quantity)) names += (names.empty() ? "" : ", ") + quantity.name;
+  if (names.empty()) return;
+  report.side_checks.push_back({"determined", State::good,
+                                "the pixels do not determine " + names + ": value and σ are what was assumed", 0.0, 0.0,
+                                "", "residuals"});
+}
+
 /// Residuals that no noise of a finder makes, or no answer: the rotation may be misread as well.
 bool is_gross(const ObserveSolution& report) {
   constexpr double max_ordinary_px = 2.0;
@@ -380,7 +390,9 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   if (may_be_misread(report)) {
     report.misread = misread.is_sought ? misread.words : misread_rotation(log, config, report, progress).words;
   }
-  if (is_answer(report)) compare_constant_spans(log, config, progress, report);
+  if (!is_answer(report)) return report;
+  compare_constant_spans(log, config, progress, report);
+  note_assumed(report);
   return report;
 }
 

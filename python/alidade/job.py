@@ -302,13 +302,17 @@ def _covariances(sigma_px: Any, pixels: Any) -> Any:
     if sigma_px is None:
         return np.zeros((0, 0, 2, 2))
     sigma, shape = numbers(sigma_px, "sigma_px"), pixels.shape[:2]
+    seen = np.isfinite(pixels).all(axis=2)
     if sigma.shape == (*shape, 2, 2):
+        skew = np.abs(sigma[..., 0, 1] - sigma[..., 1, 0]) > 1e-9 * np.abs(sigma[..., 0, 0] + sigma[..., 1, 1])
+        if (skew & seen).any():
+            photo, corner = np.argwhere(skew & seen)[0]
+            raise ValueError(f"sigma_px: the covariance of photo {photo}, corner {corner} is not symmetric")
         return np.ascontiguousarray(sigma)
     if sigma.shape in ((), shape):
         sigma = np.broadcast_to(sigma, shape)[:, :, None].repeat(2, axis=2)
     if sigma.shape != (*shape, 2):
         raise ValueError(f"sigma_px: one number, {shape}, or covariances {(*shape, 2, 2)}, but the shape is {sigma.shape}")
-    seen = np.isfinite(pixels).all(axis=2)
     if not (np.isfinite(sigma[seen]).all() and (sigma[seen] > 0.0).all()):
         raise ValueError("sigma_px: a σ is not above 0")
     covariances = np.zeros((*shape, 2, 2))

@@ -102,6 +102,13 @@ class FromCorners(unittest.TestCase):
             same = al.calibrate(corners=corners, sigma_px=given, size=f"{SIZE[0]}x{SIZE[1]}", board=BOARD, board_shape="flat")
             np.testing.assert_allclose(same.camera.parameters, one.camera.parameters, rtol=1e-12)
 
+    def test_a_covariance_is_symmetric_and_positive(self):
+        for wrong in ([[0.09, 0.02], [0.0, 0.09]], [[0.09, 0.0], [0.02, 0.09]], [[0.09, 0.1], [0.1, 0.09]], [[np.nan, 0.0], [0.0, 0.09]]):
+            covariance = np.tile(0.09 * np.eye(2), (*self.corners.shape[:2], 1, 1))
+            covariance[2, 3] = wrong
+            with self.subTest(wrong=wrong), self.assertRaises(ValueError):
+                al.calibrate(corners=self.corners, sigma_px=covariance, size=SIZE, board=BOARD)
+
     def test_unseen_corners_are_nan(self):
         partial = self.corners.copy()
         partial[::2, :20] = np.nan

@@ -53,8 +53,8 @@ struct ObserveConfig {
   std::optional<double> sigma_scale = {};     ///< Of the measured angles or rates, relative; 0: exact; none: the log's.
   std::optional<double> sigma_parallax = {};  ///< Camera centre off the axes along the view, over the points' distance.
   double window_s = 6.0;                      ///< Of ObserveMethod::window.
-  double max_gap_s = 0.25;                    ///< A longer one in a log of rates starts a segment; of angles, it tells no rate.
-  int keep_rows = 100000;                     ///< Of an Observer's rows: at least so many are kept, at most twice.
+  double max_gap_s = 0.25;  ///< A longer one in a log of rates starts a segment; of angles, it tells no rate.
+  int keep_rows = 100000;   ///< Of an Observer's rows: at least so many are kept, at most twice.
 };
 
 /// The fields of `config` that a person sets: method, rotation, estimate, start, size, profile, … window_s. The camera

@@ -48,6 +48,19 @@ class LocalizeImageFolders : public testing::CommandTest {
   }
 };
 
+/// At ten images a second corners are looked for as far as the next that looks alike: paths jumped by a square, with σ
+/// of millimetres.
+TEST_F(LocalizeImageFolders, ACornerOfABoardIsNotTakenForAnother) {
+  const Outcome made = alidade({"simulate", "underwater", "--video", "--frames", "12", "--rate", "10", "--out",
+                                path("sim"), "--quiet", "--no-report"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  const Outcome outcome = localize("sim/frames", {"--rate", "10"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json estimate = Json::parse(outcome.out)["estimate"];
+  EXPECT_EQ(estimate["restarts"], 0);
+  EXPECT_LT(estimate["ate_m"], 0.003);
+}
+
 const std::string euroc_imu_header =
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m "
     "s^-2],a_RS_S_z [m s^-2]\n";

@@ -56,7 +56,7 @@ std::optional<SeenTarget> ImageLocalizer::seen_target(const cv::Mat& smoothed) c
 /// From the start that was given, or the target; without both the first camera is the world.
 bool ImageLocalizer::start(const cv::Mat& smoothed) {
   if (config_.map) return start_in_map(smoothed);
-  const std::optional<SeenTarget> seen = seen_target(smoothed);
+  const std::optional<SeenTarget>& seen = target_now(smoothed);
   if (!seen && !config_.target.points.empty()) return false;
   if (seen && seen->num_alike > 1) {
     num_alike_ = std::max(num_alike_, seen->num_alike);
@@ -128,6 +128,7 @@ std::vector<FeatureObservation> ImageLocalizer::look(const cv::Mat& smoothed, co
   tried_.clear();
   in_view_.clear();
   constexpr double margin_px = PatchView::half_px + 2.0;
+  const std::vector<FeatureObservation>* corners = corners_of_board(smoothed);
   for (const Feature& feature : filter.features()) {  // in order of age
     const auto at = landmarks_.find(feature.id);
     if (at == landmarks_.end()) continue;
@@ -146,6 +147,10 @@ std::vector<FeatureObservation> ImageLocalizer::look(const cv::Mat& smoothed, co
     expected->S.diagonal().array() += search.extra_sigma_px * search.extra_sigma_px;
     const Eigen::Vector2d offset_px = *warp * landmark.offset_px;
     tried_.push_back({feature.id, expected->px, expected->S, {}, false});
+    if (corners && landmark.is_known && !landmark.is_saved) {
+      take_corner(*corners, observations);
+      continue;
+    }
     const auto match =
         find_patch(smoothed, *view, expected->px - offset_px, expected->S, {3.0, search.min_correlation});
     if (!match) continue;
@@ -306,7 +311,7 @@ std::vector<StartHypothesis> ImageLocalizer::likely_places(const cv::Mat& smooth
 
 bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
   std::vector<StartHypothesis> starts = likely_places(smoothed, usual_depth_m());
-  if (const auto seen = seen_target(smoothed)) starts.insert(starts.begin(), seen->starts.begin(), seen->starts.end());
+  if (const auto& seen = target_now(smoothed)) starts.insert(starts.begin(), seen->starts.begin(), seen->starts.end());
   const FilterBank before = engine_.filters();
   for (const StartHypothesis& start : starts) {
     if (try_from(smoothed, start, step)) return true;
@@ -359,6 +364,7 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
 
 PathStep ImageLocalizer::taken(const cv::Mat& grey, const cv::Mat& smoothed, long frame, double t_s) {
   mask(grey, smoothed);
+  seen_now_.reset();
   PathStep step;
   step.frame = frame_ = frame;
   step.t_s = t_s;

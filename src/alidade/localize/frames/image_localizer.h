@@ -50,6 +50,10 @@ class ImageLocalizer {
   [[nodiscard]] std::vector<StartHypothesis> likely_places(const cv::Mat& smoothed, double depth_m) const;
   void begin_at(std::span<const StartHypothesis> starts);
   [[nodiscard]] std::optional<SeenTarget> seen_target(const cv::Mat& smoothed) const;
+  [[nodiscard]] const std::optional<SeenTarget>& target_now(const cv::Mat& smoothed);
+  [[nodiscard]] bool may_mistake_corners() const;
+  [[nodiscard]] const std::vector<FeatureObservation>* corners_of_board(const cv::Mat& smoothed);
+  void take_corner(const std::vector<FeatureObservation>& corners, std::vector<FeatureObservation>& observations);
   void add_target(const cv::Mat& smoothed, const SeenTarget& seen);
   [[nodiscard]] std::vector<KnownPoint> given_points(const SeenTarget& seen) const;
   void predict_to(double t_s);
@@ -112,7 +116,8 @@ class ImageLocalizer {
   bool is_repeated_ = false;              ///< This image is the last one, byte for byte.
   std::size_t num_repeated_ = 0;
   StillParts still_;
-  ImageMask given_mask_;  ///< `shown_` without what stands still.
+  ImageMask given_mask_;                               ///< `shown_` without what stands still.
+  std::optional<std::optional<SeenTarget>> seen_now_;  ///< The target in this image, once it was looked for.
   std::vector<ObservationTried> tried_;
   std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this image.
   double t_s_ = 0.0, period_s_ = 0.0;

@@ -147,9 +147,9 @@ TEST(LoopClosure, SixtyMetresOutAndBack) {
 
 /// Numbers that a tracker gave twice lead nowhere: they close no loop.
 TEST(LoopClosure, NumbersThatAreUsedAgainForOtherPointsCloseNone) {
-  WalkRun run = long_walk({.num_points = 480, .num_frames = 240, .length_m = 6.0, .dt_s = 0.1, .rise_m = 0.3}, 4);
+  WalkRun run = long_walk({.num_points = 240, .num_frames = 120, .length_m = 3.0, .dt_s = 0.1, .rise_m = 0.3}, 4);
   for (ObservationFrame& frame : run.frames)
-    for (FeatureObservation& observation : frame.observations) observation.id %= 330;
+    for (FeatureObservation& observation : frame.observations) observation.id %= 165;
   for (ObservationFrame& frame : run.frames) {
     std::ranges::sort(frame.observations, {}, &FeatureObservation::id);
     const auto is_same = [](const FeatureObservation& a, const FeatureObservation& b) { return a.id == b.id; };

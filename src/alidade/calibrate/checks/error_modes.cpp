@@ -71,13 +71,17 @@ std::vector<ErrorMode> error_modes(std::span<const Eigen::Vector3d> board_points
 }
 
 double ordinary_size(const ErrorMode& mode, const Camera& camera) {
-  constexpr double lengths = 2e-3, spacing_m = 1e-4, corner_px = 2.0, pupil_m = 2e-3, plate_m = 5e-4, motion_m = 5e-4;
+  constexpr double lengths = 2e-3, spacing_m = 1e-4, corner_share = 1.6e-3, pupil_m = 2e-3, plate_m = 5e-4,
+                   motion_m = 5e-4;
   if (!mode.is_of_lens()) return mode.kind == ErrorMode::Kind::spacing ? spacing_m / mode.largest_m : lengths;
   if (mode.is_of_motion()) return motion_m;
   if (mode.is_of_rays()) return mode.kind == ErrorMode::Kind::pupil ? pupil_m : plate_m;
-  const double focal_px = params(camera.lens)[0];
-  const Eigen::Vector3d corner(0.5 * camera.width_px / focal_px, 0.5 * camera.height_px / focal_px, 1.0);
-  return corner_px / (focal_px * displacement_of(mode.kind, camera.lens, corner).norm());
+  const Eigen::VectorXd of_lens = params(camera.lens);
+  const double focal_px = std::sqrt(of_lens[0] * of_lens[1]);
+  const Eigen::Vector2d corner_px(0.5 * camera.width_px, 0.5 * camera.height_px);
+  const Eigen::Vector3d corner = (corner_px / focal_px).homogeneous();
+  // Of the image's diagonal: 2 px of 1000x750.
+  return corner_share * 2.0 * corner_px.norm() / (focal_px * displacement_of(mode.kind, camera.lens, corner).norm());
 }
 
 std::string sentence_of(const ErrorMode& mode, double size, double sigma) {

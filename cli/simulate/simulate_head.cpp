@@ -42,6 +42,8 @@ ExitCode simulate_head(const SimulateHeadArgs& args, Run& run) {
     tell_person(fmt::format("stream http://{}:{}/stream.mjpg", args.address, server.stream_port()));
   const std::shared_ptr<HeadClock> clock = machine_clock();
   for (const double until = clock->now_s() + args.seconds; clock->now_s() < until;) {
+    if (!args.truth.empty() && run.progress && !run.progress("serving: frames", server.num_frames(), 0))
+      throw Interrupted(fmt::format("ended after {} frames; {} has their truth", server.num_frames(), args.truth));
     report_progress(run.progress, "serving: frames", server.num_frames(), 0);
     clock->wait_until(clock->now_s() + 0.05);
   }

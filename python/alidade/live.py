@@ -105,12 +105,16 @@ class Observer(OneByOne):
         turned = _row(rotation, (2, 3, 4), "rotation")
         if self._core is None:
             self._source = self._source or {2: "head", 3: "rate", 4: "attitude"}[len(turned)]
-            self._count = len(rows)
+            self._count, self._length = len(rows), len(turned)
             self._core = _alidade.Observer(self._source, len(turned) == 3, len(rows), self._texts, self._camera)
         if len(rows) != self._count:
             raise ValueError(f"pixels: the first row had {self._count} points, this has {len(rows)}")
+        if len(turned) != self._length:
+            raise ValueError(f"rotation: the first row had {self._length} numbers, this has {len(turned)}")
         if (len(turned) == 4) != (self._source == "attitude"):
             raise ValueError(f"rotation: {len(turned)} numbers are no {self._source}")
+        if np.isinf(rows).any():
+            raise ValueError("pixels: a value is infinite; what is not seen is NaN")
         return self._core.push(number(t_s, "t_s"), turned.tolist() + [0.0] * (3 - len(turned)), rows)
 
     def finish(self, progress: Progress | None = None) -> Result:

@@ -48,6 +48,8 @@ class Live(InFolder):
         self.assertEqual(live.estimate["camera"], batch.estimate["camera"])
         self.assertTrue(np.isfinite([step["fx"], step["sigma_fx"]]).all())
         for wrong in (lambda: observer.push(99.0, [0.0] * 5, pixels), lambda: observer.push(99.0, turned, pixels[:2]),
+                      lambda: observer.push(99.0, turned[:2], pixels),
+                      lambda: observer.push(99.0, turned, [[np.inf, 0.0], *pixels[1:]]),
                       lambda: observer.push(99.0, turned, [0.0, 1.0]), lambda: al.Observer(source="moon"),
                       lambda: al.Observer().finish()):
             with self.assertRaises(ValueError):

@@ -210,13 +210,6 @@ void carry_told_sheet(RangefinderReport& report) {
   for (const ShotCause& cause : report.causes) report.beam.cov += cause.left_open * cause.left_open.transpose();
 }
 
-/// The inverse of an information whose diagonal spans many powers of ten.
-Eigen::MatrixXd inverse_of_scaled(const Eigen::MatrixXd& information) {
-  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
-  return scale.asDiagonal() * inverse_symmetric(scale.asDiagonal() * information * scale.asDiagonal()) *
-         scale.asDiagonal();
-}
-
 CommonState start_state(const BeamProblem& problem, const Camera& camera, const Beam& beam) {
   CommonState state{beam, camera, {}};
   for (const PreparedShot& shot : problem.shots)
@@ -283,31 +276,6 @@ void take_over(const RefinedBeam& refined, BeamProblem& problem, RangefinderRepo
     shot.pose = refined.poses[i];
     if (shot.plane) shot.plane = plane_of(shot.pose->cam_from_board);
   }
-}
-
-/// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses fixed, over its
-/// σ, with the σ of a reading estimated again: where that came of residuals, they contained the missing scale, too.
-double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_given,
-                       double min_sigma_m) {
-  BeamProblem work = problem;
-  work.estimate_scale = true;
-  const auto planes = std::count_if(work.shots.begin(), work.shots.end(),
-                                    [](const PreparedShot& shot) { return shot.used && shot.plane; });
-  if (problem.estimate_scale || planes < 4) return 0.0;
-  auto with = solve_beam(work, camera, beam);
-  for (int round = 0; round < 6 && with && sigma_is_given; ++round) {
-    const double change = estimate_noise(work, camera, with->beam, false, true);
-    work.model.noise.sigma_m = std::max(work.model.noise.sigma_m, min_sigma_m);
-    with = solve_beam(work, camera, with->beam);
-    if (change < 1e-2) break;
-  }
-  constexpr int enough = 3;
-  const int spare = with ? with->normals.num_rows - num_beam_params : 0;
-  if (spare < enough || !with->converged) return 0.0;
-  const double left = std::max(1.0, with->normals.cost / spare);
-  const double sigma = std::sqrt(left * inverse_of_scaled(with->normals.H)(beam_scale_param, beam_scale_param));
-  const double z = (with->beam.scale - 1.0) / sigma;
-  return std::isfinite(z) ? z : 0.0;
 }
 
 /// σ of the answer, what pulls at it, and what it rests on. `state`: where the solve ended.

@@ -63,4 +63,10 @@ BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera&
   return bound;
 }
 
+Eigen::MatrixXd inverse_of_scaled(const Eigen::MatrixXd& information) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  return scale.asDiagonal() * inverse_symmetric(scale.asDiagonal() * information * scale.asDiagonal()) *
+         scale.asDiagonal();
+}
+
 }  // namespace alidade

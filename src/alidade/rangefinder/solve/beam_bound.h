@@ -10,5 +10,7 @@ namespace alidade {
 
 /// Ratio of the largest to the least eigenvalue after scaling to a unit diagonal; infinite where it is singular.
 [[nodiscard]] double scaled_condition(const Eigen::MatrixXd& information);
+/// The inverse of an information whose diagonal spans many powers of ten.
+[[nodiscard]] Eigen::MatrixXd inverse_of_scaled(const Eigen::MatrixXd& information);
 
 }  // namespace alidade

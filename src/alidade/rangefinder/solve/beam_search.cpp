@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "alidade/beam/unit_direction.h"
+#include "alidade/rangefinder/solve/beam_bound.h"
 #include "alidade/rangefinder/solve/beam_start.h"
 
 namespace alidade {
@@ -236,6 +237,29 @@ bool looks_wrong(const BeamProblem& problem, const Camera& camera, const BeamSol
   return std::any_of(used.begin(), used.end(), [&](const PreparedShot* shot) {
     return !(shot_chi2(*shot, solution.beam, camera, problem.model) < 25.0);
   });
+}
+
+double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_estimated,
+                       double min_sigma_m) {
+  BeamProblem work = problem;
+  work.estimate_scale = true;
+  const auto planes = std::count_if(work.shots.begin(), work.shots.end(),
+                                    [](const PreparedShot& shot) { return shot.used && shot.plane; });
+  if (problem.estimate_scale || planes < 4) return 0.0;
+  auto with = solve_beam(work, camera, beam);
+  for (int round = 0; round < 6 && with && sigma_is_estimated; ++round) {
+    const double change = estimate_noise(work, camera, with->beam, false, true);
+    work.model.noise.sigma_m = std::max(work.model.noise.sigma_m, min_sigma_m);
+    with = solve_beam(work, camera, with->beam);
+    if (change < 1e-2) break;
+  }
+  constexpr int enough = 3;
+  const int spare = with ? with->normals.num_rows - num_beam_params : 0;
+  if (spare < enough || !with->converged) return 0.0;
+  const double left = std::max(1.0, with->normals.cost / spare);
+  const double sigma = std::sqrt(left * inverse_of_scaled(with->normals.H)(beam_scale_param, beam_scale_param));
+  const double z = (with->beam.scale - 1.0) / sigma;
+  return std::isfinite(z) ? z : 0.0;
 }
 
 }  // namespace alidade

@@ -39,4 +39,9 @@ struct OutlierSearch {
 /// Returns the largest relative change.
 double estimate_noise(BeamProblem& problem, const Camera& camera, const Beam& beam, bool of_spots, bool of_ranges);
 
+/// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses fixed, over its
+/// σ, with the σ of a reading estimated again: where that came of residuals, they contained the missing scale, too.
+[[nodiscard]] double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam,
+                                     bool sigma_is_estimated, double min_sigma_m);
+
 }  // namespace alidade

@@ -208,7 +208,7 @@ std::vector<ServoSample> log_of_gain(bool is_rate_plant, bool is_chirp, const Se
 /// 5 % between the directions, over the log, and from small commands to large ones: they were taken for drifts of
 /// clocks, limits, dead bands and slips, and a log of a rate plant for one that does not determine its gain.
 TEST(ServoCauses, AGainThatIsNotOneIsEstimated) {
-  const auto draws = static_cast<std::uint64_t>(testing::trials(2));
+  const auto draws = static_cast<std::uint64_t>(testing::trials(1));
   int good = 0, runs = 0;
   double sum2 = 0.0;
   for (const std::size_t flaw : {std::size_t{ServoFlaw::gain_difference}, std::size_t{ServoFlaw::gain_drift},

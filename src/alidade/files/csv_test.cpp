@@ -4,21 +4,13 @@
 
 #include <utility>
 
+#include "alidade/testing/fault.h"
 #include "alidade/testing/temporary_folder.h"
 
 namespace alidade {
 namespace {
 
-/// The message of what `work` throws; empty if it throws nothing.
-template <typename Work>
-std::string fault_of(Work work) {
-  try {
-    work();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+using testing::fault_of;
 
 std::string fault_of_text(std::string_view text) {
   return fault_of([&] { (void)Csv::parse(text, "shots.csv"); });

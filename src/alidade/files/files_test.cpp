@@ -12,30 +12,22 @@
 #include <thread>
 #include <vector>
 
+#include "alidade/testing/fault.h"
 #include "alidade/testing/temporary_folder.h"
 
 namespace alidade {
 namespace {
 
+using testing::fault_of;
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
 std::string fault_of_reading(const std::filesystem::path& file) {
-  try {
-    (void)read_file(file);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return fault_of([&] { (void)read_file(file); });
 }
 
 std::string fault_of_writing(const std::filesystem::path& file) {
-  try {
-    write_file(file, "x");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return fault_of([&] { write_file(file, "x"); });
 }
 
 std::size_t num_entries(const std::filesystem::path& folder) {

@@ -12,12 +12,14 @@
 #include <thread>
 
 #include "alidade/files/descriptor.h"
+#include "alidade/testing/fault.h"
 #include "alidade/testing/process.h"
 
 namespace alidade {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::fault_of;
 using ::testing::HasSubstr;
 using testing::run_in_child;
 using testing::TemporaryFolder;
@@ -33,16 +35,6 @@ std::map<std::string, std::string> content_of(const fs::path& folder) {
 }
 
 using Content = std::map<std::string, std::string>;
-
-/// What throws, in words; "" if nothing.
-std::string fault_of(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(FolderSwap, NothingStandsThereBeforeCommit) {
   const TemporaryFolder folder;

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "alidade/testing/fault.h"
 #include "alidade/testing/random.h"
 #include "alidade/testing/temporary_folder.h"
 
 namespace alidade {
 namespace {
 
+using testing::fault_of;
 using ::testing::HasSubstr;
 
 constexpr CameraFormat all_formats[] = {CameraFormat::alidade, CameraFormat::opencv, CameraFormat::ros,
@@ -90,29 +92,19 @@ TEST(CameraFile, ACovarianceMayNameSomeParameters) {
 
 // --- what a format cannot store -------------------------------------------------------------------------------------
 
-std::string camera_fault(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no InputError";
-}
-
 TEST(CameraFile, WhatWouldBeLostIsSaidAndRefused) {
   Camera camera{640, 480, Calibrated<Brown>{Params<Brown>{500, 500, 320, 240, 0, 0.1, 0, 0, 0, 0.25}}, {}, 0.0, {}};
-  EXPECT_EQ(camera_fault([&] { (void)camera_text(camera, CameraFormat::kalibr); }),
+  EXPECT_EQ(fault_of([&] { (void)camera_text(camera, CameraFormat::kalibr); }),
             "the format kalibr cannot hold k3 0.25; --lossy writes it without");
   EXPECT_THAT(camera_text(camera, CameraFormat::kalibr, true), HasSubstr("distortion_coeffs: [0.1, 0.0, 0.0, 0.0]"));
   std::get<Calibrated<Brown>>(camera.lens).params[4] = 0.3;
   for (const CameraFormat format : all_formats) {
     if (format == CameraFormat::alidade) continue;
-    EXPECT_THAT(camera_fault([&] { (void)camera_text(camera, format); }), HasSubstr("cannot hold skew 0.3 px"));
+    EXPECT_THAT(fault_of([&] { (void)camera_text(camera, format); }), HasSubstr("cannot hold skew 0.3 px"));
     EXPECT_EQ(params(parse_camera(camera_text(camera, format, true), "f").lens)[4], 0.0);
   }
   camera.lens = Calibrated<KannalaBrandt>{Params<KannalaBrandt>{500, 500, 320, 240, 0, 0.1, 0, 0, 0}};
-  EXPECT_THAT(camera_fault([&] { (void)camera_text(camera, CameraFormat::mrcal, true); }),
-              HasSubstr("mrcal has no lens"));
+  EXPECT_THAT(fault_of([&] { (void)camera_text(camera, CameraFormat::mrcal, true); }), HasSubstr("mrcal has no lens"));
   camera.cov = Eigen::MatrixXd::Identity(9, 9);
   EXPECT_THAT(other_losses(camera, CameraFormat::ros), ::testing::ElementsAre("the covariance"));
   EXPECT_TRUE(other_losses(camera, CameraFormat::alidade).empty());
@@ -214,12 +206,11 @@ TEST(CameraFile, OneOfSeveralCamerasIsChosenByName) {
   write_file(list, "3 PINHOLE 640 480 500 500 320.5 240.5\n5 PINHOLE 640 480 600 600 320.5 240.5\n");
   EXPECT_EQ(params(read_camera(chain.string() + ":cam1").lens)[0], 600.0);
   EXPECT_EQ(params(read_camera(list.string() + ":3").lens)[0], 500.0);
-  EXPECT_EQ(camera_fault([&] { (void)read_camera(chain); }),
+  EXPECT_EQ(fault_of([&] { (void)read_camera(chain); }),
             chain.string() + ": holds 2 cameras (cam0, cam1); choose one: " + chain.string() + ":cam0");
-  EXPECT_THAT(camera_fault([&] { (void)read_camera(list.string() + ":4"); }),
-              HasSubstr("has no camera '4'; it has 3, 5"));
+  EXPECT_THAT(fault_of([&] { (void)read_camera(list.string() + ":4"); }), HasSubstr("has no camera '4'; it has 3, 5"));
   write_file(chain, camera_text({640, 480, Calibrated<Pinhole>{{1, 1, 1, 1, 0}}, {}, 0, {}}, CameraFormat::alidade));
-  EXPECT_THAT(camera_fault([&] { (void)read_camera(chain.string() + ":cam1"); }), HasSubstr("holds one camera"));
+  EXPECT_THAT(fault_of([&] { (void)read_camera(chain.string() + ":cam1"); }), HasSubstr("holds one camera"));
 }
 
 TEST(CameraFile, WhatIsNotReadIsNamed) {
@@ -348,7 +339,7 @@ TEST(CameraFile, AWrongFileIsOneLineThatNamesTheKey) {
       {"1 FULL_OPENCV 640 480 500 500 320 240 0 0 0 0 0 0.1 0 0", "f:1: PARAMS: k4 is 0.1: a rational lens"},
   };
   for (const auto& [text, expected] : cases) {
-    const std::string fault = camera_fault([&from = text] { (void)parse_camera(from, "f"); });
+    const std::string fault = fault_of([&from = text] { (void)parse_camera(from, "f"); });
     EXPECT_THAT(fault, HasSubstr(expected)) << text.substr(0, 200);
     EXPECT_EQ(fault.find('\n'), std::string::npos) << fault;
   }
@@ -373,14 +364,13 @@ TEST(CameraFile, ATruncatedFileNeverGivesACamera) {
 }
 
 TEST(CameraFile, AFileThatIsNotThereIsNamed) {
-  EXPECT_THAT(camera_fault([] { (void)read_camera("/no/such/camera.yaml"); }), HasSubstr("/no/such/camera.yaml"));
-  EXPECT_THAT(camera_fault([] { (void)read_camera("/no/such/camera.yaml:cam0"); }),
-              HasSubstr("/no/such/camera.yaml:cam0"));
+  EXPECT_THAT(fault_of([] { (void)read_camera("/no/such/camera.yaml"); }), HasSubstr("/no/such/camera.yaml"));
+  EXPECT_THAT(fault_of([] { (void)read_camera("/no/such/camera.yaml:cam0"); }), HasSubstr("/no/such/camera.yaml:cam0"));
 }
 
 TEST(CameraFormatName, IsKnownOrNamed) {
   for (const CameraFormat format : all_formats) EXPECT_EQ(camera_format(camera_format_name(format)), format);
-  EXPECT_EQ(camera_fault([] { (void)camera_format("bouguet"); }),
+  EXPECT_EQ(fault_of([] { (void)camera_format("bouguet"); }),
             "'bouguet' is no camera format; known: alidade, opencv, ros, kalibr, mrcal, colmap");
 }
 

@@ -21,10 +21,12 @@
 #include "alidade/heads/protocols/onvif_service.h"
 #include "alidade/heads/protocols/rotctl_head.h"
 #include "alidade/heads/protocols/soap.h"
+#include "alidade/testing/fault.h"
 
 namespace alidade {
 namespace {
 
+using testing::fault_of;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -112,15 +114,6 @@ std::string turning_camera(const std::string& request, const std::string& positi
     return http(200, soap("<r><PTZStatus><Position>" + position + "</Position></PTZStatus></r>"));
   if (request.find("<AbsoluteMove") != std::string::npos) return http(500, page);
   return http(200, soap("<r/>"));
-}
-
-std::string fault_of(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(HostileLinks, AMountThatSaysMoreThanCanBeReadIsStoppedInTime) {

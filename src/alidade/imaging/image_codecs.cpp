@@ -17,18 +17,13 @@
 #include <stdexcept>
 #include <vector>
 
+#include "alidade/imaging/image_size.h"
 #include "alidade/imaging/tiff_image.h"
 
 namespace alidade {
 namespace {
 
 bool begins_with(std::string_view bytes, std::string_view magic) { return bytes.substr(0, magic.size()) == magic; }
-
-/// Images of more pixels are a header's lie, or too large to work with.
-bool is_possible(std::size_t width, std::size_t height) {
-  constexpr std::size_t max_side = 1u << 20, max_pixels = 1u << 30;
-  return width >= 1 && height >= 1 && width <= max_side && height <= max_side && width * height <= max_pixels;
-}
 
 // --- JPEG -----------------------------------------------------------------------------------------------------------
 
@@ -73,7 +68,8 @@ bool read_jpeg(std::string_view bytes, cv::Mat& image) {
   jpeg_create_decompress(&info);
   jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   jpeg_read_header(&info, TRUE);
-  if (!is_possible(info.image_width, info.image_height)) fail_jpeg(reinterpret_cast<j_common_ptr>(&info));
+  if (!is_possible_image(info.image_width, info.image_height, bytes.size()))
+    fail_jpeg(reinterpret_cast<j_common_ptr>(&info));
   const bool is_ink = info.jpeg_color_space == JCS_CMYK || info.jpeg_color_space == JCS_YCCK;
   if (is_ink) {
     info.out_color_space = JCS_CMYK;
@@ -177,7 +173,8 @@ bool read_png(PngSource& source, bool keep_alpha, cv::Mat& image, std::vector<pn
   }
   png_set_read_fn(png, &source, take_png);
   png_read_info(png, info);
-  if (!is_possible(png_get_image_width(png, info), png_get_image_height(png, info))) fail_png(png, "");
+  const std::size_t width = png_get_image_width(png, info), height = png_get_image_height(png, info);
+  if (!is_possible_image(width, height, source.bytes.size())) fail_png(png, "");
   plan_png(png, info, keep_alpha);
   const int depth = png_get_bit_depth(png, info) == 16 ? CV_16U : CV_8U;
   image.create(static_cast<int>(png_get_image_height(png, info)), static_cast<int>(png_get_image_width(png, info)),
@@ -258,7 +255,7 @@ cv::Mat decode_bmp(std::string_view bytes) {
   const unsigned bits = little_endian(bytes, 28, 2), compression = little_endian(bytes, 30, 4);
   const bool is_top_down = signed_height < 0;
   const auto rows = static_cast<std::size_t>(std::abs(static_cast<long>(signed_height)));
-  if (header < 40 || width < 1 || !is_possible(static_cast<std::size_t>(width), rows)) return {};
+  if (header < 40 || width < 1 || !is_possible_image(static_cast<std::size_t>(width), rows, bytes.size())) return {};
   if ((bits != 8 && bits != 24 && bits != 32) || compression != 0) return {};
   const auto columns = static_cast<std::size_t>(width);
   const std::size_t stride = (columns * bits / 8 + 3) / 4 * 4, palette = 14 + header;
@@ -303,7 +300,7 @@ cv::Mat decode_pnm(std::string_view bytes) {
   std::size_t at = 2;
   const auto width = header_number(bytes, at), height = header_number(bytes, at), most = header_number(bytes, at);
   if (!width || !height || !most || *width < 1 || *height < 1 || *most < 1 || *most > 65535) return {};
-  if (!is_possible(static_cast<std::size_t>(*width), static_cast<std::size_t>(*height))) return {};
+  if (!is_possible_image(static_cast<std::size_t>(*width), static_cast<std::size_t>(*height), bytes.size())) return {};
   ++at;  // one space
   const int channels = bytes[1] == '6' ? 3 : 1;
   cv::Mat image(*height, *width, CV_MAKETYPE(*most > 255 ? CV_16U : CV_8U, channels));

@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/imaging/image_size.h"
 #include "alidade/testing/random.h"
 
 namespace alidade {
@@ -35,6 +36,20 @@ void expect_same(const cv::Mat& ours, const cv::Mat& theirs, const std::string& 
   ASSERT_EQ(ours.type(), theirs.type()) << what;
   ASSERT_EQ(ours.size(), theirs.size()) << what;
   EXPECT_EQ(cv::norm(ours, theirs, cv::NORM_INF), 0.0) << what;
+}
+
+/// A few hundred bytes that announce a gigapixel are refused before room is made for it; a blank page is read.
+TEST(ImageCodecs, MakeNoRoomForMoreThanAFileCanHold) {
+  EXPECT_FALSE(is_possible_image(30000, 30000, 205));
+  EXPECT_FALSE(is_possible_image(0, 480, 1000));
+  EXPECT_TRUE(is_possible_image(640, 480, 205));
+  const cv::Mat page(8000, 6000, CV_8U, cv::Scalar(255));
+  for (const char* const ending : {".png", ".tiff", ".jpg"}) {
+    const std::string bytes = encoded(ending, page);
+    expect_same(decode_image(bytes), page, ending);
+  }
+  const std::string one_bit = encoded(".png", page, {cv::IMWRITE_PNG_BILEVEL, 1, cv::IMWRITE_PNG_COMPRESSION, 9});
+  expect_same(decode_image(one_bit), page, "one bit");
 }
 
 /// What OpenCV writes is read as OpenCV reads it, to the last bit.

@@ -9,6 +9,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "alidade/imaging/image_size.h"
+
 namespace alidade {
 namespace {
 
@@ -74,6 +76,17 @@ TiffShape shape_of(TIFF* tiff) {
   return shape;
 }
 
+/// Whether room can be made for it: libtiff makes room for a whole strip or tile of all samples.
+bool is_possible_shape(TIFF* tiff, const TiffShape& shape, std::size_t num_bytes) {
+  constexpr std::uint16_t max_samples = 8;
+  constexpr std::uint64_t max_block_bytes = std::uint64_t{1} << 32, smallest_bytes = 1u << 24;
+  if (!is_possible_image(shape.width, shape.height, num_bytes) || shape.samples > max_samples || shape.bits > 32)
+    return false;
+  const std::uint64_t image_bytes = std::uint64_t{shape.width} * shape.height * shape.samples * shape.bits / 8;
+  const std::uint64_t block_bytes = TIFFIsTiled(tiff) != 0 ? TIFFTileSize64(tiff) : TIFFStripSize64(tiff);
+  return block_bytes <= std::min(max_block_bytes, 4 * image_bytes + smallest_bytes);
+}
+
 bool is_grey(const TiffShape& shape) {
   return shape.photometric == PHOTOMETRIC_MINISBLACK || shape.photometric == PHOTOMETRIC_MINISWHITE;
 }
@@ -118,11 +131,7 @@ cv::Mat decode_tiff(std::string_view bytes, bool keep_alpha) {
                                                               seek_to, close_nothing, size_of_file, nullptr, nullptr));
   if (!tiff) return {};
   const TiffShape shape = shape_of(tiff.get());
-  constexpr std::uint32_t max_side = 1u << 20;
-  constexpr std::uint64_t max_pixels = 1u << 30;
-  const bool is_possible = shape.width >= 1 && shape.height >= 1 && shape.width <= max_side &&
-                           shape.height <= max_side && std::uint64_t{shape.width} * shape.height <= max_pixels;
-  if (!is_possible || shape.format != SAMPLEFORMAT_UINT) return {};
+  if (shape.format != SAMPLEFORMAT_UINT || !is_possible_shape(tiff.get(), shape, bytes.size())) return {};
   const bool is_plain =
       (shape.bits == 8 || shape.bits == 16) && shape.planes == PLANARCONFIG_CONTIG && TIFFIsTiled(tiff.get()) == 0 &&
       (is_grey(shape) ? shape.samples <= 2

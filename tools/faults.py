@@ -36,10 +36,12 @@ COMMANDS = {
     "identify": "identify {s}/servo/log.csv",
     "localize": "localize {s}/underwater/sights.csv --camera {s}/underwater/camera.yaml --target {s}/underwater/target.yaml",
 }
-KINDS = {  # the call, errno of its failure, and whether all calls after it fail as well
-    "open": ("open", errno.EMFILE, False), "write": ("write", errno.ENOSPC, True), "rename": ("rename", errno.EACCES, False),
-    "renames": ("rename", errno.EACCES, True), "mkdir": ("mkdir", errno.EROFS, False), "sync": ("sync", errno.EIO, False),
-    "mmap": ("mmap", errno.ENOMEM, False), "malloc": ("malloc", errno.ENOMEM, False),
+ALL = 0
+KINDS = {  # the call, errno of its failure, and how many fail from that one on
+    "open": ("open", errno.EMFILE, 1), "write": ("write", errno.ENOSPC, ALL), "rename": ("rename", errno.EACCES, 1),
+    "renames": ("rename", errno.EACCES, ALL), "mkdir": ("mkdir", errno.EROFS, 1), "sync": ("sync", errno.EIO, 1),
+    "mmap": ("mmap", errno.ENOMEM, 1), "malloc": ("malloc", errno.ENOMEM, 1),
+    "mallocs": ("malloc", errno.ENOMEM, 5), "memory": ("malloc", errno.ENOMEM, ALL),  # one fewer is served from a reserve
 }
 HIDDEN = ".alidade-"  # what a killed process leaves, until the next run clears it away
 VOLATILE = ("result.json", "report.html")  # have the time in them
@@ -92,15 +94,19 @@ class Trial:
         if with_old:
             shutil.copytree(self.old, self.out)
 
+    def check_end(self, what, code, error, codes=(0, 1, 3, 4, 6)):
+        lines = [line for line in error.splitlines() if line.strip()]
+        if code not in codes or (code in (1, 3) and len(lines) != 1):
+            self.problems.append(f"{what}: exit {code}: {' | '.join(lines)[:200]}")
+
     def check(self, what, code=None, error="", output="", codes=(0, 1, 3, 4, 6)):
         """What the folder holds after a fault, and what was said."""
         found = contents(self.out, with_hidden=code != 0)  # where only clearing up failed, the next run does it
         is_whole = found is None or found in (self.old_content, self.new_content) or (
             "report: not written" in error + output and {**found, "report.html": b""} in (self.old_content, self.new_content))
         beside = [path.name for path in self.base.iterdir() if path not in (self.out, self.old)]
-        lines = [line for line in error.splitlines() if line.strip()]
-        if code is not None and (code not in codes or (code in (1, 3) and len(lines) != 1)):
-            self.problems.append(f"{what}: exit {code}: {' | '.join(lines)[:200]}")
+        if code is not None:
+            self.check_end(what, code, error, codes)
         if not is_whole:
             near = min((self.old_content, self.new_content), key=lambda c: len(set(c) ^ set(found)))
             differ = sorted(k for k in set(near) | set(found) if near.get(k) != found.get(k))
@@ -133,20 +139,29 @@ def fail_calls(trial, shim, generator, kinds, most):
     log = trial.folder / "log"
     done = collections.Counter()
     for kind in kinds:
-        call, number, goes_on = KINDS[kind]
-        faults = {"LD_PRELOAD": str(shim), "FAIL_CALL": call, "FAIL_ERRNO": str(number), "FAIL_LOG": str(log)}
-        if goes_on:
-            faults["FAIL_LAST"] = "1"
+        call, number, in_a_row = KINDS[kind]
+        faults = {"LD_PRELOAD": str(shim), "FAIL_CALL": call, "FAIL_ERRNO": str(number), "FAIL_LOG": str(log), "FAIL_COUNT": str(in_a_row)}
         trial.begin(False)
         trial.run(**faults)
         count = int(log.read_text().split()[0])
         if kind == "sync" and count < len(trial.new_content):  # a power cut would lose what the system has not written yet
             trial.problems.append(f"{trial.name}: {count} calls of fsync for {len(trial.new_content)} files")
+        first = 1
+        if call == "malloc" and most == 0:
+            first = 1 + fail_in_copies(trial, kind, faults)
+            done[kind] += first - 1
         for nth in chosen_calls(count, most, generator):
+            if nth < first:
+                continue
             trial.begin(kind == "renames" or nth % 2 == 0)
             try:
                 ended = trial.run(**faults, FAIL_NTH=str(nth))
-                if kind == "renames" and contents(trial.out) != trial.old_content:  # nothing can be undone either
+                if kind == "memory":  # nor can anything be cleared away: as after a kill
+                    what = f"memory {nth} of {count} and all after it fail"
+                    trial.check_end(f"{trial.name}: {what}", ended.returncode, ended.stderr)
+                    check_killed(trial, what)
+                    check_next_run(trial, what)
+                elif kind == "renames" and contents(trial.out) != trial.old_content:  # nothing can be undone either
                     check_set_aside(trial, f"rename {nth} of {count} and all after it fail", ended.returncode)
                 else:
                     trial.check(f"{trial.name}: {kind} {nth} of {count} fails", ended.returncode, ended.stderr, ended.stdout)
@@ -154,6 +169,25 @@ def fail_calls(trial, shim, generator, kinds, most):
                 trial.problems.append(f"{trial.name}: {kind} {nth} of {count} fails: hangs")
             done[kind] += 1
     return done
+
+
+def fail_in_copies(trial, kind, faults):
+    """Every call until the first file is opened for writing fails in a copy of one process. How many these are."""
+    trial.begin(False)
+    copies, said = trial.folder / "copies", trial.folder / "said"
+    one_processor = {min(os.sched_getaffinity(0))}  # TBB then starts no threads, which a copy would not have
+    with open(said, "w") as file:
+        subprocess.run(trial.line(), cwd=trial.base, stdout=subprocess.DEVNULL, stderr=file, preexec_fn=lambda: os.sched_setaffinity(0, one_processor),
+                       env={**os.environ, **faults, "FAIL_FORK": str(copies)})
+    calls, ends = 0, collections.defaultdict(list)
+    for line in copies.read_text().splitlines():
+        calls, status, lines = (int(word) for word in line.split())
+        code = os.waitstatus_to_exitcode(status)
+        if code not in (0, 1, 3, 4, 6, 77) or (code in (1, 3) and lines != 1):
+            ends[f"exit {code}, {lines} lines"].append(calls)
+    for end, numbers in ends.items():
+        trial.problems.append(f"{trial.name}: {kind} fails: {end}: {len(numbers)} times, from {numbers[0]} to {numbers[-1]}")
+    return calls
 
 
 def check_killed(trial, what):

@@ -288,7 +288,8 @@ int run_cli(int argc, const char* const* argv, void (*add_commands)(App&)) {
   } catch (const std::filesystem::filesystem_error& error) {
     return failed(error.path1().string() + ": " + error.code().message(), ExitCode::bad_input);
   } catch (const std::bad_alloc&) {
-    return failed("internal: not enough memory; use fewer or smaller inputs", ExitCode::internal_error);
+    tell_out_of_memory();
+    return static_cast<int>(ExitCode::internal_error);
   } catch (const cv::Exception& error) {
     return failed("internal: OpenCV: " + error.err + bug, ExitCode::internal_error);
   } catch (const std::exception& error) {

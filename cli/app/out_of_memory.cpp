@@ -2,14 +2,15 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdlib>
 #include <exception>
 #include <new>
-#include <string_view>
 
 #include "alidade/estimation/verdict.h"
+#include "cli/app/terminal.h"
 
 namespace alidade::cli {
 namespace {
@@ -30,18 +31,27 @@ void release_reserve() {
 
 /// Without an allocation, unlike the standard one's names of exceptions.
 [[noreturn]] void end_in_one_line() {
-  std::string_view line = "alidade: error: internal: an error within the handling of another; please report this\n";
+  const bool is_used_up = std::ranges::none_of(reserve, [](const auto& part) { return part.load() != nullptr; });
   try {
     if (std::current_exception()) std::rethrow_exception(std::current_exception());
+    if (is_used_up) {
+      tell_out_of_memory();  // not even for an exception there was room
+    } else {
+      tell_without_memory("alidade: error: internal: an end without an error; please report this\n");
+    }
   } catch (const std::bad_alloc&) {
-    line = "alidade: error: internal: not enough memory; use fewer or smaller inputs\n";
+    tell_out_of_memory();
   } catch (...) {
+    tell_without_memory("alidade: error: internal: an error within the handling of another; please report this\n");
   }
-  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, line.data(), line.size());
   ::_exit(static_cast<int>(ExitCode::internal_error));
 }
 
 }  // namespace
+
+void tell_out_of_memory() {
+  tell_without_memory("alidade: error: internal: not enough memory; use fewer or smaller inputs\n");
+}
 
 void prepare_for_out_of_memory() {
   for (std::atomic<void*>& part : reserve) {

@@ -7,4 +7,7 @@ namespace alidade::cli {
 /// it all the same says so in the one line of any internal error, with exit code 1.
 void prepare_for_out_of_memory();
 
+/// That line, without an allocation.
+void tell_out_of_memory();
+
 }  // namespace alidade::cli

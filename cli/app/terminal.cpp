@@ -14,8 +14,8 @@
 namespace alidade::cli {
 namespace {
 
-std::atomic<int> stop_signal{0};  // a signal handler can reach nothing but a global
-std::atomic<int> people{-1};      // where lines for people go; a terminal's line is wiped before them
+std::atomic<int> stop_signal{0};         // a signal handler can reach nothing but a global
+std::atomic<int> people{STDERR_FILENO};  // where lines for people go; a terminal's line is wiped before them
 std::atomic<bool> is_on_terminal{false}, has_nothing_written{false}, has_patience{false};
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 timer_t patience;
@@ -96,6 +96,7 @@ Terminal::Terminal() : state_(std::make_shared<State>()) {
 Terminal::~Terminal() {
   state_->wipe();
   ::dup2(state_->people, STDERR_FILENO);
+  people = STDERR_FILENO;
   ::close(state_->people);
 }
 
@@ -131,6 +132,11 @@ void tell_person(std::string_view line) {
   const std::shared_ptr<Terminal::State> state = Terminal::current().lock();
   if (state) state->wipe();
   write_text(state ? state->people : STDERR_FILENO, one_line(line) + "\n");
+}
+
+void tell_without_memory(std::string_view line) {
+  if (is_on_terminal) write_text(people, "\r\033[K");
+  write_text(people, line);
 }
 
 void catch_interrupts() {

@@ -39,6 +39,9 @@ void give_back_stderr();
 /// A printed line, on stderr, after wiping the progress line: what they need while the command runs.
 void tell_person(std::string_view line);
 
+/// A line on stderr, as it is, without an allocation: where no memory is left.
+void tell_without_memory(std::string_view line);
+
 /// Where stdin, stdout or stderr is closed, something stands in its place: no file of ours takes its number. Writing to
 /// such a stdout fails.
 void hold_standard_streams();

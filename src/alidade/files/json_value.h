@@ -20,7 +20,11 @@ class JsonValue {
  public:
   using Member = std::pair<std::string, JsonValue>;
   using List = std::vector<JsonValue>;
-  using Object = std::vector<Member>;
+  /// A type of its own: libstdc++ 12 takes a variant of its own types for one that always holds a value, and where a
+  /// copy finds no memory it would destroy what was never made.
+  struct Object : std::vector<Member> {
+    using std::vector<Member>::vector;
+  };
   using Content = std::variant<std::nullptr_t, bool, std::int64_t, double, std::string, std::vector<std::int64_t>,
                                std::vector<double>, List, Object>;
 

@@ -4,6 +4,7 @@
 
 #include "alidade/localize.h"
 #include "alidade/testing/hover.h"
+#include "alidade/testing/trials.h"
 
 // More points than a filter holds: those that are of little use leave, and come back by their number.
 
@@ -40,9 +41,9 @@ TEST(LongWalk, OfFiveHundredPointsNoFrameIsLost) {
 }
 
 /// The filter alone has 10 to 30 here: points that leave end what it is right to be sure of. A run's error is mostly
-/// one draw of six numbers: a mean over eight scatters by √(2/6/8) = 0.2.
+/// one draw of six numbers: a mean over five scatters by √(2/6/5) = 0.26.
 TEST(LongWalk, ThePoseIsAsGoodAsItsCovarianceSays) {
-  constexpr std::uint64_t num_seeds = 8;
+  const auto num_seeds = static_cast<std::uint64_t>(testing::trials(5));
   double nees = 0.0;
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     const WalkRun run = long_walk({.num_points = 300, .num_frames = 450, .sigma_known_m = 0.001}, 100 + seed);
@@ -59,7 +60,7 @@ TEST(LongWalk, ThePoseIsAsGoodAsItsCovarianceSays) {
 
 /// The whole of a recording that is too long is every fourth of its frames: less sure, and as sure as it says.
 TEST(LongWalk, OfALongRecordingEveryFourthFrameIsSolvedForAndTheOthersFollow) {
-  constexpr std::uint64_t num_seeds = 6;
+  const auto num_seeds = static_cast<std::uint64_t>(testing::trials(4));
   double nees = 0.0, between = 0.0;
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     const WalkRun run = long_walk({.num_points = 300, .num_frames = 450, .sigma_known_m = 0.001}, 200 + seed);

@@ -8,6 +8,7 @@
 
 #include "alidade/localize/path/pose_chain.h"
 #include "alidade/testing/hover.h"
+#include "alidade/testing/trials.h"
 
 namespace alidade {
 namespace {
@@ -154,13 +155,14 @@ double mean_nees(const Localization& report, const HoverRun& run) {
 }
 
 /// All given right, by a simulator with lenses of its own. A run's error is mostly one draw of six components, that of
-/// the frame by the target's points: a mean over 10 scatters by √(2/6/10) = 0.18.
+/// the frame by the target's points: a mean over 6 scatters by √(2/6/6) = 0.24.
 TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
-  constexpr int num_seeds = 10;
+  const int num_seeds = testing::trials(6);
   for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye, HoverLens::port}) {
     double nees = 0.0;
-    for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
-      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 80, .num_others = 30}, 1000 + seed);
+    for (int seed = 1; seed <= num_seeds; ++seed) {
+      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 80, .num_others = 30},
+                                             1000 + static_cast<std::uint64_t>(seed));
       const Localization report = hover_localized(run, run.camera);
       EXPECT_TRUE(report.is_smoothed);
       nees += mean_nees(report, run) / num_seeds;
@@ -208,11 +210,12 @@ TEST(SimpleCase, ErrorsThatLastAreHeeded) {
 
 /// A camera drawn from its file's covariance: counted, the path's σ holds; unknown, it is many times too small.
 TEST(SimpleCase, TheLensesCovarianceIsCounted) {
-  constexpr int num_seeds = 16;
+  const int num_seeds = testing::trials(16);
   double counted = 0.0, ignored = 0.0;
   Draws draws(77);
-  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
-    const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 30}, 500 + seed);
+  for (int seed = 1; seed <= num_seeds; ++seed) {
+    const HoverRun run =
+        testing::hovering({.num_frames = 60, .num_others = 30}, 500 + static_cast<std::uint64_t>(seed));
     Camera given = run.camera;
     Eigen::VectorXd values = params(given.lens), sigma = Eigen::VectorXd::Zero(values.size());
     sigma.head<4>() << 4.0, 4.0, 3.0, 3.0;

@@ -1,5 +1,6 @@
 #include "cli/app/app.h"
 
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 
@@ -220,6 +221,8 @@ int App::dispatch(int argc, const char* const* argv) {
     throw UsageError(usage_fault(app, error));
   }
   Command& command = *chosen_command();
+  for (const std::string_view word : std::vector<std::string_view>(argv + 1, argv + argc))
+    if (lacks_a_number(word)) throw UsageError(fmt::format("{}: '{}' lacks a number", command.spec.name, word));
   CommonOptions& options = command.options;
   take_config(*command.app, command.fields, command.config);
   if (command.app->count("--out") > 0) options.leaves_results = true;

@@ -32,10 +32,13 @@ std::function<ExitCode(cli::Run&)> work_of_test;
 
 void add_test_commands(App& app) {
   auto length = std::make_shared<double>(1.0);
+  static std::vector<double> lengths;
+  lengths.clear();
   CLI::App& command =
       app.add_command({"work", "Does what the test says", "  alidade work --length 2", true, true, true},
                       [](cli::Run& run) { return work_of_test(run); });
   command.add_option("--length", *length, "A length [m]")->check(positive_number());
+  command.add_option("--lengths", lengths, "Several [m]")->delimiter(',')->check(positive_number());
   app.add_group("camera", "Cameras");
   app.add_command({"camera show", "Shows a camera", "  alidade camera show a.yaml", false, false},
                   [](cli::Run& run) { return work_of_test(run); });
@@ -98,6 +101,8 @@ TEST(App, WrongUsageIsOneLineAndExitCode2) {
       {{"work", "--length", "nan"}, "work: --length: 'nan' is not a finite number"},
       {{"work", "--length", "1e999"}, "work: --length: '1e999' is not a finite number"},
       {{"work", "--length", "-1"}, "work: --length: '-1' is not above zero"},
+      {{"work", "--lengths", "1,,2"}, "work: '1,,2' lacks a number"},
+      {{"work", "--lengths=1,2,"}, "work: '--lengths=1,2,' lacks a number"},
       {{"work", "--threads", "-1"}, "work: --threads: Value -1 not in range 0 to 1024"},
       {{"camera"}, "camera: a command is required: show; see alidade camera --help"},
       {{"camera", "shwo"}, "camera: unknown command 'shwo'; did you mean 'show'?"},

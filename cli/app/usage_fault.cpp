@@ -140,4 +140,13 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
   return where(at) + error.what() + (is_missing ? in_help : "");
 }
 
+bool lacks_a_number(std::string_view word) {
+  if (const std::size_t value = word.find('='); word.substr(0, 1) == "-" && value != std::string_view::npos)
+    word.remove_prefix(value + 1);
+  const bool is_list = word.find(',') != std::string_view::npos &&
+                       word.find_first_of("0123456789") != std::string_view::npos &&
+                       word.find_first_not_of("0123456789.,+-eE ") == std::string_view::npos;
+  return is_list && (word.front() == ',' || word.back() == ',' || word.find(",,") != std::string_view::npos);
+}
+
 }  // namespace alidade::cli

@@ -260,6 +260,9 @@ TEST(CameraFile, WhatIsNotReadIsNamed) {
 
   EXPECT_EQ(unread("3 PINHOLE 640 480 500 500 320 240\n5 PINHOLE 640 480 600 600 320 240\n", ":5"),
             "that it is 5 of 2 cameras (3, 5)");
+  EXPECT_THAT(
+      fault_of([&] { (void)unread("5 PINHOLE 640 480 500 500 320 240\n5 PINHOLE 640 480 600 600 320 240\n", ":5"); }),
+      HasSubstr("has more than one camera '5'"));
   EXPECT_EQ(unread(camera_text(parse_camera("1 PINHOLE 64 48 50 50 32 24", "f"), CameraFormat::alidade)), "");
 }
 

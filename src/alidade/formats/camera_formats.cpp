@@ -17,6 +17,8 @@ std::size_t chosen_camera(const std::vector<std::string>& names, const CameraTex
   }
   const auto found = std::find(names.begin(), names.end(), file.choice);
   if (found == names.end()) refuse(file.name, "", fmt::format("has no camera '{}'; it has {}", file.choice, all));
+  if (std::count(found, names.end(), file.choice) > 1)
+    refuse(file.name, "", fmt::format("has more than one camera '{}'", file.choice));
   return static_cast<std::size_t>(found - names.begin());
 }
 

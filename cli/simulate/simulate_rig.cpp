@@ -25,6 +25,7 @@ struct SimulateRigArgs {
   int boards = 8, views = 4;
   double sigma_px = 0.2, sigma_angle_deg = 0.02, wrong = 0.0;
   double scale = 1.0, once_deg = 0.0, twice_deg = 0.0, backlash_deg = 0.0, moved_mm = 0.0;
+  double wrong_corners = 0.0, stretch = 0.0, bend_mm = 0.0;
   RigMistake mistake;
   bool photos = false;
 };
@@ -36,6 +37,8 @@ RigSceneConfig config_from(const SimulateRigArgs& args, Run& run) {
   config.encoder_scale = args.scale;
   config.once_rad = args.once_deg * degree;
   config.sigma_moved_m = 1e-3 * args.moved_mm;
+  config.print_stretch = args.stretch;
+  config.board_bend_m = 1e-3 * args.bend_mm;
   for (RigHead& head : xiahou_rig()) config.nominal.push_back(head);
   if (!args.rig.empty()) {
     run.add_input("rig", args.rig);
@@ -83,8 +86,8 @@ Camera with_sigma(Camera camera) {
 
 ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   const RigScene scene = draw_rig_scene(config_from(args, run), run.options.seed);
-  const RigNoise noise{args.sigma_px, args.sigma_angle_deg * degree, args.wrong, args.twice_deg * degree,
-                       args.backlash_deg * degree};
+  const RigNoise noise{args.sigma_px,           args.sigma_angle_deg * degree, args.wrong,
+                       args.twice_deg * degree, args.backlash_deg * degree,    args.wrong_corners};
   SimulatedViews simulated = simulate_head_views(scene, noise, run.options.seed);
   simulated.views = mistaken_views(std::move(simulated.views), scene, args.mistake);
   if (args.photos) {
@@ -147,6 +150,11 @@ void add_rig_scenario(App& app) {
   add_number(command, "--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
   add_number(command, "--moved-mm", args->moved_mm,
              "σ of each coordinate by which boards are moved between the heads' views [mm]", 0.0, 100.0);
+  add_number(command, "--wrong-corners", args->wrong_corners, "Share of the corners that are up to 30 px elsewhere",
+             0.0, 0.5);
+  add_number(command, "--stretch", args->stretch, "By how much wider the board's columns are printed than its rows",
+             -0.1, 0.1);
+  add_number(command, "--bend-mm", args->bend_mm, "By which the board's ends stand off its middle [mm]", -20.0, 20.0);
   add_number(command, "--focal-error", args->mistake.focal,
              "Share by which the camera files' focal lengths are too long", -0.5, 0.5);
   add_number(command, "--centre-error", args->mistake.centre_px, "Error of their centres in u and v [px]", -1e3, 1e3);

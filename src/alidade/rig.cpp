@@ -12,6 +12,7 @@
 #include "alidade/board_detector/find_boards.h"
 #include "alidade/camera/camera_fault.h"
 #include "alidade/rig/checks/repeated_stops.h"
+#include "alidade/rig/checks/wrong_corners.h"
 #include "alidade/rig/rig.h"
 
 namespace alidade {
@@ -100,6 +101,14 @@ std::optional<WrongBoard> find_board_corners(RigCalibration& result, const std::
   return wrong;
 }
 
+/// Without corners that are elsewhere than the others of their view say.
+void drop_wrong_corners(RigCalibration& result, const std::map<int, Camera>& cameras) {
+  CheckedCorners checked = without_wrong_corners(result.measured, points_in_board(*result.config.board), cameras);
+  result.measured = std::move(checked.views);
+  result.wrong_corners = std::move(checked.wrong);
+  result.counts.skipped.insert(result.counts.skipped.end(), result.wrong_corners.begin(), result.wrong_corners.end());
+}
+
 /// The views of one stop as one. Returns σ of a reading within a stop [rad].
 double average_stops(RigCalibration& result) {
   AveragedStops stops = averaged_stops(result.measured);
@@ -120,6 +129,7 @@ RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cam
   result.measured = std::move(views);
   std::optional<WrongBoard> wrong;
   if (load_photo) wrong = find_board_corners(result, cameras, load_photo, progress);
+  if (config.reject_outliers) drop_wrong_corners(result, cameras);
   const double sigma_within_rad = average_stops(result);
   const auto calibrated = config.estimate_by_need ? calibrate_rig_by_need : calibrate_rig;
   static_cast<RigReport&>(result) =

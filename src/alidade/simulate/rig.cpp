@@ -108,6 +108,18 @@ void use_first_camera(Rig& rig) {
   }
 }
 
+/// Where the corners of a board are that was printed and mounted so.
+std::vector<Eigen::Vector3d> real_points(const RigSceneConfig& config) {
+  std::vector<Eigen::Vector3d> points = points_in_board(config.board);
+  const Eigen::Vector3d centre = 0.5 * (points.front() + points.back());
+  for (Eigen::Vector3d& point : points) {
+    const double along = (point.x() - centre.x()) / centre.x();  // −1 to 1
+    point.x() = centre.x() + (1.0 + config.print_stretch) * (point.x() - centre.x());
+    point.z() += config.board_bend_m * along * along;
+  }
+  return points;
+}
+
 }  // namespace
 
 RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
@@ -118,7 +130,7 @@ RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
   for (const RigHead& nominal : config.nominal)
     scene.rig.heads.push_back(drawn_head(nominal, config, scene.rig.heads.empty(), draws));
   use_first_camera(scene.rig);
-  const std::vector<Eigen::Vector3d> points = points_in_board(config.board);
+  const std::vector<Eigen::Vector3d> points = real_points(config);
   const Eigen::Vector3d centre = 0.5 * (points.front() + points.back());
   constexpr int max_tries = 100000;
   for (int tries = 0; static_cast<int>(scene.world_from_board.size()) < config.num_boards; ++tries) {
@@ -175,6 +187,27 @@ class ReadingErrors {
   std::map<int, std::pair<Eigen::Vector2d, Eigen::Vector2d>> last_;  ///< By head: reading, travel.
 };
 
+bool is_in_image(const Eigen::Vector2d& px, const Rig& rig, int head) {
+  return std::any_of(rig.heads.begin(), rig.heads.end(), [&](const RigHead& one) {
+    return one.head.id == head && px.minCoeff() >= 0.0 && px.x() < one.camera.width_px - 1.0 &&
+           px.y() < one.camera.height_px - 1.0;
+  });
+}
+
+/// Corners found elsewhere in the image. Draws of their own: without them the views are the same.
+void move_corners(const RigScene& scene, const RigNoise& noise, std::uint64_t seed, std::vector<HeadView>& views) {
+  if (!(noise.wrong_corners > 0.0)) return;
+  Draws draws(seed + 0x51ed270b7a1fu);
+  for (HeadView& view : views) {
+    for (Corner& corner : view.seen.corners) {
+      if (draws.uniform() >= noise.wrong_corners) continue;
+      const double u = draws.uniform(-1.0, 1.0), v = draws.uniform(-1.0, 1.0);
+      const Eigen::Vector2d px = corner.px + noise.wrong_corner_px * Eigen::Vector2d(u, v);
+      if (is_in_image(px, scene.rig, view.head)) corner.px = px;
+    }
+  }
+}
+
 }  // namespace
 
 SimulatedViews simulate_head_views(const RigScene& scene, const RigNoise& noise, std::uint64_t seed) {
@@ -185,6 +218,7 @@ SimulatedViews simulate_head_views(const RigScene& scene, const RigNoise& noise,
     view.pan_tilt_rad += errors.of(view) + noise.sigma_encoder_rad * draws.normal2();
     for (Corner& corner : view.seen.corners) corner.px += noise.sigma_px * draws.normal2();
   }
+  move_corners(scene, noise, seed, simulated.views);
   const auto num = scene.views.size();
   const auto num_wrong = static_cast<std::size_t>(std::lround(noise.wrong_views * static_cast<double>(num)));
   for (std::size_t made = 0; made < num_wrong;) {

@@ -36,6 +36,8 @@ struct RigSceneConfig {
   double once_rad = 0.0;            ///< Amplitude of an error of one period per turn of each axis, its phase drawn.
   bool shared = true;               ///< Each board is seen by all heads.
   double sigma_moved_m = 0.0;       ///< Of each coordinate by which a board is moved before the other heads' views.
+  double print_stretch = 0.0;       ///< By how much wider columns are printed than rows.
+  double board_bend_m = 0.0;        ///< By which the board's ends stand off its middle.
 };
 
 /// Draws heads and boards. Boards that some head does not see at two pairs of angles are drawn again. Same seed, same
@@ -45,9 +47,11 @@ struct RigSceneConfig {
 struct RigNoise {
   double sigma_px = 0.2;
   double sigma_encoder_rad = 0.02 * 0.017453292519943295;
-  double wrong_views = 0.0;   ///< Share of the views whose angles are those of another view.
-  double twice_rad = 0.0;     ///< Amplitude of an error of two periods per turn of each axis, its phase drawn.
-  double backlash_rad = 0.0;  ///< Of each axis: readings are half of it too large where the axis came from below.
+  double wrong_views = 0.0;       ///< Share of the views whose angles are those of another view.
+  double twice_rad = 0.0;         ///< Amplitude of an error of two periods per turn of each axis, its phase drawn.
+  double backlash_rad = 0.0;      ///< Of each axis: readings are half of it too large where the axis came from below.
+  double wrong_corners = 0.0;     ///< Share of the corners that are found elsewhere, by up to
+  double wrong_corner_px = 30.0;  ///< so much in u and in v.
 };
 struct SimulatedViews {
   std::vector<HeadView> views;

@@ -215,7 +215,8 @@ Eigen::MatrixXd lenses_by_wide(const RigProblem& wide, const RigState& state, Ei
   return M;
 }
 
-/// The covariance of heads and lenses together, where a lens has one or is estimated. `cov`: of the wide parameters.
+/// The covariance of heads and lenses together, where a lens has one or is estimated. `cov`: of the wide parameters,
+/// with all that is given.
 void take_lenses(Rig& rig, const RigGiven& given, const RigState& state, const Eigen::MatrixXd& J,
                  const Eigen::MatrixXd& cov) {
   const Eigen::MatrixXd M = lenses_by_wide(given.wide, state, given.cov_lenses.rows());
@@ -291,7 +292,7 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
   const Eigen::MatrixXd cov_wide = widened(work.problem, given.wide, work.report.clusters.cov);
   const WorldAtCamera world = world_at_camera(given.wide, state, cov_wide + given.cov);
   work.report.rig = world.rig;
-  take_lenses(work.report.rig, given, state, world.J, cov_wide);
+  take_lenses(work.report.rig, given, state, world.J, cov_wide + given.cov);
   take_backlash(work, state, given.wide, cov_wide + given.cov);
   work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
   take_assumed(work.report, given, world.J);

@@ -8,6 +8,7 @@
 #include "alidade/estimation/verdict.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/rig/checks/indicated_lens.h"
+#include "alidade/rig/checks/lens_of_views.h"
 #include "alidade/rig/checks/misreadings.h"
 #include "alidade/rig/rig_work.h"
 
@@ -82,6 +83,17 @@ class BestMisreading {
   std::optional<Misreading> best_;
   std::pair<int, double> least_;
 };
+
+/// Corners that no pose of the board explains: it is another, or they are numbered otherwise.
+std::optional<RigReport> misread_board(const Work& table) {
+  const std::string words = corners_of_another_board(table);
+  if (words.empty()) return std::nullopt;
+  RigReport report = table.report;
+  report.status = Status::misread;
+  report.misreading = words;
+  report.misreading_remedy = "check --board COLSxROWS, that corners are numbered row by row, and the camera files";
+  return report;
+}
 
 /// Rotations of the boards that contradict each other, and agree once the angles are read otherwise: before anything is
 /// solved with angles that cannot be.
@@ -220,8 +232,10 @@ RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::
                         const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress) {
   const FreedParams nothing;
   const Work table = prepared_work(views, points_in_board, cameras, config, nothing, progress);
+  if (auto of_board = misread_board(table)) return std::move(*of_board);
   if (auto misread = misread_by_rotations(table, cameras)) return std::move(*misread);
   RigReport report = calibrated_with(views, points_in_board, cameras, config, nothing, progress);
+  report.lens_of_views = lens_of_views(table);
   if (are_swapped(table, cameras, report)) report.status = Status::swapped;
   if (report.status == Status::swapped || is_lens_off(table, cameras, report)) return report;
   if (report.status == Status::converged || report.status == Status::no_convergence ||
@@ -237,7 +251,10 @@ RigReport calibrate_rig_by_need(std::span<const HeadView> views, std::span<const
                                 const Progress& progress) {
   RigReport report = calibrate_rig(views, points_in_board, cameras, config, progress);
   if (report.status != Status::converged) return report;
-  return freed_by_need(std::move(report), views, points_in_board, cameras, config, progress);
+  const std::optional<RigCause> of_views = report.lens_of_views;
+  RigReport freed = freed_by_need(std::move(report), views, points_in_board, cameras, config, progress);
+  freed.lens_of_views = of_views;
+  return freed;
 }
 
 }  // namespace alidade

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,10 @@ struct HeadCover {
 
 /// Name of a cause: boards were moved between the views of one head and those of another.
 inline constexpr const char* moved_boards_name = "board positions";
+/// Its print is wider along its columns than along its rows, by a share; its points do not lie in a plane [m].
+inline constexpr const char *board_stretch_name = "board stretch", *board_bend_name = "board bend";
+/// Of a head, over the views as they were taken.
+inline constexpr const char* focal_drift_name = "focal length drift";
 
 /// A parameter that the residuals indicate to be free: by how many σ, and its value (a score test).
 struct RigCause {
@@ -67,6 +72,12 @@ struct RigCause {
   [[nodiscard]] double rank() const { return sigmas * (name.starts_with("all ") ? 0.8 : is_of_boards() ? 0.7 : 1.0); }
   /// Of boards, between the views of one head and those of another.
   [[nodiscard]] bool is_of_boards() const { return name == moved_boards_name; }
+  /// Of the board itself, whoever sees it.
+  [[nodiscard]] bool is_of_print() const { return name == board_stretch_name || name == board_bend_name; }
+  /// Named, as a rig has no such parameter.
+  [[nodiscard]] bool has_no_parameter() const {
+    return is_drift() || is_distortion() || is_of_boards() || is_of_print() || name.ends_with("camera.fy");
+  }
   /// Of a lens, beyond what its file says.
   [[nodiscard]] bool is_distortion() const { return name.ends_with("camera.k1"); }
   [[nodiscard]] bool is_of_lens() const { return name.find("camera.") != std::string::npos || name == "all centre"; }
@@ -101,6 +112,7 @@ struct RigReport {
   Eigen::MatrixXd cov_model;                        ///< As rig.cov, with independent errors and everything given exact.
   ClusterCovariance clusters;                       ///< Views; of the parameters that are solved for.
   std::vector<Assumption> assumed;                  ///< Lenses, the square, the encoders' scales.
+  std::optional<RigCause> lens_of_views;            ///< What the views, each by itself, say of a lens.
   std::vector<RigCause> causes;                     ///< Tested one by one, the most significant first.
   std::vector<RigFreed> freed;                      ///< By need.
   std::string alike;                                ///< Two causes that explain the residuals alike; empty: none.
@@ -122,6 +134,7 @@ struct RigReport {
   /// σ of where another head's camera (else the camera after a rotation, against where it started) stands, over the
   /// angles covered: what the calibration is for.
   double sigma_relative_rad = 0.0, sigma_relative_m = 0.0;
+  double board_distance_m = 0.0;                    ///< Of half of the views at least.
   double sigma_span_rad = 0.0, sigma_span_m = 0.0;  ///< The same over good_span_rad where less is covered.
   int views_used = 0, views_dropped = 0, iterations = 0;
 

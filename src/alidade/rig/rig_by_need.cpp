@@ -149,28 +149,53 @@ class ByNeed {
     return std::nullopt;
   }
 
+  static const RigCause& first_of(const RigReport& report) {
+    return *std::ranges::max_element(
+        report.causes, {}, [](const RigCause& cause) { return cause.is_of_boards() ? cause.rank() : cause.sigmas; });
+  }
+
   std::vector<Candidate> asked() const {
     constexpr double near = 0.5;  // of the largest: what one cause does looks to another's score like itself
     std::vector<Candidate> candidates;
     if (best_.causes.empty()) return candidates;
-    const RigCause& first = *std::ranges::max_element(
-        best_.causes, {}, [](const RigCause& cause) { return cause.is_of_boards() ? cause.rank() : cause.sigmas; });
-    const auto has_no_parameter = [](const RigCause& cause) {
-      return cause.is_drift() || cause.is_distortion() || cause.is_of_boards();
-    };
-    // It is named, and nothing else absorbs it.
-    if (has_no_parameter(first) && first.sigmas > rig_cause_limit) return candidates;
-    const double largest = first.sigmas;
+    const RigCause& first = first_of(best_);
+    // It is named, and nothing else absorbs it. Boards that all moved would absorb nearly anything: first what else.
+    if (first.has_no_parameter() && !first.is_of_boards() && first.sigmas > rig_cause_limit) return candidates;
+    const double largest = first.is_of_boards() ? first.rank() : first.sigmas;
     for (const RigCause& cause : best_.causes) {
       const bool is_joint = cause.name.starts_with("all ");  // six of forty, and the ones that see most
       if (cause.sigmas < (is_joint ? rig_free_joint_limit : rig_free_limit)) continue;
       if (cause.sigmas < near * largest) continue;
-      if (has_no_parameter(cause)) continue;
+      if (cause.has_no_parameter()) continue;
       Candidate next = candidate_of(cause, best_.rig);
       const bool is_new = num_of(with(freed_, next)) > num_of(freed_);
       if (is_new && candidates.size() < 8) candidates.push_back(std::move(next));
     }
     return candidates;
+  }
+
+  static bool are_boards_indicated(const RigReport& report) {
+    return std::ranges::any_of(
+        report.causes, [](const RigCause& cause) { return cause.is_of_boards() && cause.sigmas > rig_cause_limit; });
+  }
+
+  /// They are what would be named.
+  static bool are_boards_first(const RigReport& report) {
+    return are_boards_indicated(report) && first_of(report).is_of_boards();
+  }
+
+  /// A centre that is asked for by chance would make σ of all else larger.
+  static bool is_centre_vague(const RigReport& report, const Candidate& candidate) {
+    constexpr double max_px = 1.0;
+    for (const RigHead& one : report.rig.heads) {
+      const auto found = candidate.params.find(one.head.id);
+      if (found == candidate.params.end()) continue;
+      for (const int param : found->second) {
+        const Eigen::Index k = param == centre_x_param ? 2 : param == centre_y_param ? 3 : -1;
+        if (k >= 0 && one.camera.cov(k, k) > max_px * max_px) return true;
+      }
+    }
+    return false;
   }
 
   bool free_next() {
@@ -182,8 +207,12 @@ class ByNeed {
     std::vector<Trial> trials;
     for (const Candidate& candidate : asked()) {
       const FreedParams freed = with(freed_, candidate);
-      if (auto report = solve(freed)) trials.push_back({candidate, std::move(*report), 0.0});
-      if (!trials.empty()) trials.back().score = score_of(trials.back().report, freed);
+      auto report = solve(freed);
+      if (!report || (are_boards_first(best_) && are_boards_indicated(*report)) ||
+          (candidate.cause.sigmas < rig_cause_limit && is_centre_vague(*report, candidate)))
+        continue;
+      const double score = score_of(*report, freed);
+      trials.push_back({candidate, std::move(*report), score});
     }
     if (trials.empty()) return false;
     std::ranges::sort(trials, {}, &Trial::score);

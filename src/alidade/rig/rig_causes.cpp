@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "alidade/rig/checks/board_print.h"
 #include "alidade/rig/checks/moved_boards.h"
 #include "alidade/rig/checks/rig_score.h"
 
@@ -14,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index tested_a_head = 24;
+constexpr Index tested_a_head = 26;
 
 /// Something that could be free: its columns among all that are tested.
 struct Tested {
@@ -27,7 +28,8 @@ struct Tested {
 /// Indices of a head's columns: lens, then for each axis scale, one period, two periods, backlash; the drifts of the
 /// base's position and rotation, and of each axis' zero.
 constexpr Index column_of_axis(int axis) { return 3 + 6 * axis; }
-constexpr Index base_drift_column = 15, zero_drift_column = 21, distortion_column = 23;
+constexpr Index base_drift_column = 15, zero_drift_column = 21, distortion_column = 23, fy_column = 24,
+                focal_drift_column = 25;
 
 /// One by one: of these only what is fixed.
 std::vector<Tested> single_tests(const RigProblem& problem, const RigState& state) {
@@ -44,7 +46,9 @@ std::vector<Tested> single_tests(const RigProblem& problem, const RigState& stat
     add("camera.fx", "px", focal_param, {0});
     add("camera.cx", "px", centre_x_param, {1});
     add("camera.cy", "px", centre_y_param, {2});
+    add("camera.fy", "px", -1, {fy_column});
     add("camera.k1", "", -1, {distortion_column});
+    add(focal_drift_name, "px", -1, {focal_drift_column});
     for (const int axis : {0, 1}) {
       const std::string name = axis == 0 ? "pan" : "tilt";
       const Index at = column_of_axis(axis);
@@ -111,6 +115,8 @@ MatrixXd tested_columns(const RigProblem& problem, const RigState& state, std::s
   }
   D.col(distortion_column) = given.distortion;
   D.middleCols<6>(base_drift_column) = time * given.base;
+  D.col(fy_column) = given.lens.col(1);
+  D.col(focal_drift_column) = time * D.col(0);
   return D;
 }
 
@@ -147,6 +153,8 @@ std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& sol
     causes.push_back({tested.name, size, tested.unit, asked->sigmas});
   }
   if (const auto moved = moved_boards(problem, solved, cov, weights, cov_lenses, num_given)) causes.push_back(*moved);
+  for (RigCause& cause : board_print(problem, solved, cov, weights, cov_lenses, num_given))
+    causes.push_back(std::move(cause));
   std::ranges::sort(causes, std::greater{}, &RigCause::rank);
   return causes;
 }

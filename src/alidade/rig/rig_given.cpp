@@ -203,14 +203,9 @@ std::optional<double> counted_sigma_scale(const RigConfig& config) {
   return std::hypot(*config.sigma_scale, slope_of_waves * config.sigma_within_turn_rad);
 }
 
-namespace {
-
-/// ∂ pixel / ∂ k1 of a factor 1 + k1 r² about the centre of the image.
 Eigen::Vector2d by_radial_term(const Eigen::VectorXd& lens, const Eigen::Vector2d& px, const Eigen::Vector3d& p) {
   return p.head<2>().squaredNorm() / (p.z() * p.z()) * (px - lens.segment<2>(2));
 }
-
-}  // namespace
 
 GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t v) {
   const RigView& which = problem.views[v];

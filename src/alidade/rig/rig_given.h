@@ -21,6 +21,9 @@ struct GivenColumns {
   Eigen::Matrix<double, Eigen::Dynamic, 2> readings;
   Eigen::Matrix<double, Eigen::Dynamic, 6> base;
 };
+/// ∂ pixel / ∂ k1 of a factor 1 + k1 r² about the centre of the image, of a point in the camera seen at `px`.
+[[nodiscard]] Eigen::Vector2d by_radial_term(const Eigen::VectorXd& lens, const Eigen::Vector2d& px,
+                                             const Eigen::Vector3d& point_in_cam);
 [[nodiscard]] GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t view);
 
 /// What a rig's estimate was given — lenses, the printed square, the encoders' scales — and what it does to the

@@ -310,9 +310,28 @@ std::optional<SolvedRig> solve_rig(const RigProblem& problem, const RigState& st
   return solved;
 }
 
+namespace {
+
+/// Of each free parameter what counts as one radian, or one metre: of a centre a focal length.
+Eigen::VectorXd units_of(const RigProblem& problem, const RigState& state) {
+  Eigen::VectorXd units = Eigen::VectorXd::Ones(problem.num_free());
+  for (std::size_t h = 0; h < problem.free.size(); ++h) {
+    for (std::size_t k = 0; k < problem.free[h].size(); ++k) {
+      const int param = problem.free[h][k];
+      if (param != centre_x_param && param != centre_y_param) continue;
+      const Eigen::VectorXd lens = params(state.heads[h].camera.lens);
+      units[problem.first_free(h) + static_cast<Eigen::Index>(k)] = lens[param == centre_x_param ? 0 : 1];
+    }
+  }
+  return units;
+}
+
+}  // namespace
+
 RigCovariance rig_covariance(const RigProblem& problem, const SolvedRig& solved) {
   const Eigen::MatrixXd S = solved.system.information();
-  const SymmetricEigen raw = symmetric_eigen(S);
+  const Eigen::VectorXd units = units_of(problem, solved.state);
+  const SymmetricEigen raw = symmetric_eigen(Eigen::MatrixXd(units.asDiagonal() * S * units.asDiagonal()));
   RigCovariance out;
   // A combination that is not known to 1 rad or 1 m is not known.
   if (!S.allFinite() || !(raw.values[0] > 1.0)) {

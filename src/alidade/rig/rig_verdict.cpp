@@ -10,8 +10,14 @@ namespace alidade {
 namespace {
 
 using RigStatus = RigReport::Status;
-constexpr double good_relative_rad = 0.2 * degree, good_relative_m = 0.0035;  // of a use in tracking
-constexpr double refuse_relative_rad = 2.0 * degree, refuse_relative_m = 0.05;
+constexpr double good_relative_rad = 0.2 * degree, near_relative_m = 0.0035;  // of a use in tracking
+constexpr double refuse_relative_rad = 2.0 * degree, refuse_by_good = 0.05 / near_relative_m;
+
+/// Of boards, and what is tracked, farther away than is usual a good position is as much less exact.
+double good_relative_m(const RigReport& report) {
+  constexpr double usual_m = 1.5;
+  return near_relative_m * std::max(1.0, report.board_distance_m / usual_m);
+}
 
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
@@ -67,8 +73,20 @@ Verdict refusal_by_link(const RigReport& report) {
   return undetermined("not all heads share boards with each other", "let all heads see a board in the same position");
 }
 
+/// Views that contradict each other, and each by itself says that a lens is not its file's.
+std::optional<Verdict> refusal_by_lens(const RigReport& report, const std::string& sentence) {
+  constexpr double plain = 10.0;  // a bent board looks a little like it
+  if (!report.lens_of_views || !(report.lens_of_views->sigmas > plain)) return std::nullopt;
+  const RigCause& cause = *report.lens_of_views;
+  return rig_refusal(State::not_converged, ExitCode::no_convergence,
+                     sentence + ": each by itself they indicate another " + cause.name + ", by " +
+                         text_of(cause.size, 2) + " (" + text_of(cause.sigmas, 2) + "σ)",
+                     "calibrate that lens again: its file is of another lens, or lacks its distortion");
+}
+
 Verdict refusal_by_status(const RigReport& report) {
-  if (const auto few = refusal_by_count(report)) return *few;
+  if (report.status != RigStatus::misread)
+    if (const auto few = refusal_by_count(report)) return *few;
   switch (report.status) {
     case RigStatus::degrees:
       return rig_refusal(State::refused, ExitCode::undetermined,
@@ -92,9 +110,12 @@ Verdict refusal_by_status(const RigReport& report) {
       break;
   }
   if (const auto angles = refusal_by_angles(report)) return *angles;
-  if (report.status == RigStatus::degenerate)
+  if (report.status == RigStatus::degenerate) {
+    if (auto of_lens = refusal_by_lens(report, "no rig explains these views")) return *of_lens;
     return undetermined("these cannot be separated: " + joined(report.unknown),
                         "look at each board from more pans and tilts");
+  }
+  if (auto of_lens = refusal_by_lens(report, "no rig explains these views")) return *of_lens;
   return rig_refusal(State::not_converged, ExitCode::no_convergence, "no rig explains these views",
                      "check that each view has its own angles (radians), head and board, and the camera files");
 }
@@ -106,7 +127,7 @@ Check check_of(std::string name, State state, std::string text, double value, do
 /// How many more views like these bring both σ down to what is good: they fall as the root of the number.
 std::string views_lacking(const RigReport& report) {
   const double times =
-      std::max(report.sigma_relative_rad / good_relative_rad, report.sigma_relative_m / good_relative_m);
+      std::max(report.sigma_relative_rad / good_relative_rad, report.sigma_relative_m / good_relative_m(report));
   constexpr double most_times = 3.0;  // nine times as many views: nobody takes these
   if (times > most_times) return "; more views alone do not suffice: boards nearer or larger, at more pans and tilts";
   const double lacking = std::ceil(static_cast<double>(report.views.size()) * (times * times - 1.0));
@@ -125,13 +146,14 @@ void add_precision(const RigReport& report, Verdict& verdict) {
                                       value / unit, good / unit, symbol));
   };
   add("rotation", report.sigma_relative_rad, good_relative_rad, refuse_relative_rad, degree, "°", "");
-  add("position", report.sigma_relative_m, good_relative_m, refuse_relative_m, 1e-3, "mm", " ");
+  add("position", report.sigma_relative_m, good_relative_m(report), refuse_by_good * good_relative_m(report), 1e-3,
+      "mm", " ");
 }
 
 /// A small range of an axis is enough where the views determine the rig beyond it, too: what counts is σ over 20° of
 /// each axis, not how far each happened to move.
 void add_spans(const RigReport& report, Verdict& verdict) {
-  const bool is_known = report.sigma_span_rad < good_relative_rad && report.sigma_span_m < good_relative_m;
+  const bool is_known = report.sigma_span_rad < good_relative_rad && report.sigma_span_m < good_relative_m(report);
   for (const HeadCover& cover : report.covers) {
     for (int axis = 0; axis < 2; ++axis) {
       const double span = cover.highest_rad[axis] - cover.lowest_rad[axis];
@@ -229,6 +251,16 @@ const RigCause& first_cause(const RigReport& report) {
 std::string indicated_text(const RigCause& cause) {
   const std::string by = ", by " + text_of(cause.size, 2) + (cause.unit.empty() ? "" : " " + cause.unit) + " (" +
                          text_of(cause.sigmas, 2) + "σ)";
+  if (cause.name.ends_with(focal_drift_name))
+    return "the residuals indicate a " + cause.name + " from the first view to the last" + by +
+           ": a lens that was refocused or zoomed; fix it, and take the views again";
+  if (cause.name == board_stretch_name)
+    return "the board's columns are " + text_of(1e2 * std::abs(cause.size), 2) +
+           (cause.size > 0.0 ? " % farther" : " % less") + " apart than its rows (" + text_of(cause.sigmas, 2) +
+           "σ): its print is stretched (or the pixels of all cameras are); print it without scaling";
+  if (cause.name == board_bend_name)
+    return "the board is not flat, by " + text_of(1e3 * cause.size, 2) + " mm (" + text_of(cause.sigmas, 2) +
+           "σ): glue it to something flat, and take the views again";
   if (cause.is_drift())
     return "the residuals indicate a " + cause.name + " from the first view to the last" + by +
            ": a head that was moved (two show it against each other only), or a zero that creeps; take the views again";
@@ -245,11 +277,11 @@ void add_causes(const RigReport& report, Verdict& verdict) {
   constexpr double most = rig_cause_limit;
   const RigCause& first = first_cause(report);
   const bool is_quiet = first.sigmas < most;
-  verdict.checks.push_back(
-      check_of("causes", is_quiet ? State::good : State::care,
-               is_quiet ? "other lenses, scales, eccentricities, backlash, drifts and moved boards are not indicated"
-                        : indicated_text(first),
-               first.sigmas, most, "σ"));
+  verdict.checks.push_back(check_of(
+      "causes", is_quiet ? State::good : State::care,
+      is_quiet ? "other lenses, scales, eccentricities, backlash, drifts, moved and bent boards are not indicated"
+               : indicated_text(first),
+      first.sigmas, most, "σ"));
 }
 
 /// What was estimated by need is reported. Where it is significant the answer is one of care: it was not expected, and
@@ -306,6 +338,8 @@ Verdict refusal_by_check(const RigReport& report, const Check& refused, const Ve
   if (refused.name != "outliers")
     return undetermined("too little for this noise: " + refused.text,
                         "look at more boards, nearer, from more pans and tilts");
+  if (!are_misread(report))
+    if (auto of_lens = refusal_by_lens(report, "the views do not agree")) return *of_lens;
   return rig_refusal(State::not_converged, ExitCode::no_convergence, "the views do not agree: " + refused.text,
                      are_misread(report) ? "correct these rows, and calibrate again"
                                          : "check that each view has its own angles, head and board");

@@ -16,7 +16,7 @@ using PlacedStatus = MovingTargetReport::Status;
 struct Agreement {
   std::size_t num_placed = 0;
   double sigma_px = std::numeric_limits<double>::infinity();  ///< Root mean square of the cameras'.
-  double focal_sigmas = 0.0;                                  ///< By which a focal length is asked to be another, most.
+  double lens_sigmas = 0.0;                                   ///< By which a lens is asked to be another, most.
   double flatness = 1.0;  ///< The path's thickness over its length: of one in a plane, 0.
 };
 
@@ -39,8 +39,7 @@ Agreement agreement_of(const MovingTargetReport& report) {
     ++agreement.num_placed;
     sum2 += camera.sigma_px * camera.sigma_px;
   }
-  for (const FocalScore& focal : report.focals)
-    agreement.focal_sigmas = std::max(agreement.focal_sigmas, focal.sigmas());
+  for (const LensScore& lens : report.lenses) agreement.lens_sigmas = std::max(agreement.lens_sigmas, lens.sigmas());
   agreement.flatness = flatness_of(report.path);
   if (agreement.num_placed > 0) agreement.sigma_px = std::sqrt(sum2 / static_cast<double>(agreement.num_placed));
   return agreement;
@@ -121,7 +120,7 @@ Best best_undone(const std::vector<TargetObservation>& observations, const std::
     std::swap(exchanged[a].camera, exchanged[b].camera);
     const Agreement agreement = agreement_of(place(observations, exchanged, clock_search_s));
     // One wrong file may fit another head better, and is as wrong there.
-    if (agreement.focal_sigmas > focal_limit) continue;
+    if (agreement.lens_sigmas > lens_limit) continue;
     best.consider(agreement, "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
   }
   return best;

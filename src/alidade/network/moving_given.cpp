@@ -4,12 +4,14 @@
 #include <cmath>
 #include <string>
 
+#include "alidade/network/moving_lenses.h"
+
 namespace alidade {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double usual_f = 0.003, usual_centre_px = 2.0, usual_distance = 0.005;
+constexpr double usual_f = 0.003, usual_centre_px = 2.0, usual_k1 = 0.01, usual_distance = 0.005;
 
 struct Given {
   Assumption what;
@@ -36,14 +38,18 @@ void add_lens(const RigHead& rig_head, const Eigen::MatrixXd& follows, std::vect
   if (has_cov) given.cov += follows * cov * follows.transpose();
 }
 
-/// A focal length that the observations half ask to be another may be that.
-void carry_asked(const SolvedMoving& solved, FocalScore& focal, Eigen::MatrixXd& cov) {
+/// A lens that the observations half ask to be another may be that.
+void carry_asked(const SolvedMoving& solved, const LensScore& lens, Eigen::MatrixXd& cov) {
   constexpr double hardly = 2.5;
-  const Camera& camera = solved.state.heads[focal.head].camera;
-  const VectorXd values = params(camera.lens);
-  if (camera.cov.rows() == values.size()) focal.given = std::sqrt(std::max(0.0, camera.cov(0, 0))) / values[0];
-  if (focal.sigmas() < hardly) return;
-  const VectorXd moved = solved.by_lens[focal.head].leftCols(2) * (focal.asked * values.head(2));
+  const Camera& camera = solved.state.heads[lens.head].camera;
+  const auto at = lens_param_of(camera, lens.part);
+  // What they hardly determine they may ask for by chance, and far too much of it.
+  const double ordinary = lens.part == LensPart::focal ? 1.0 : lens.part == LensPart::k1 ? usual_k1 : usual_centre_px;
+  if (lens.sigmas() < hardly || !at || std::hypot(lens.sigma, lens.given) > ordinary) return;
+  const Eigen::MatrixXd& by_lens = solved.by_lens[lens.head];
+  const VectorXd moved = lens.part == LensPart::focal
+                             ? VectorXd(by_lens.leftCols(2) * (lens.asked * params(camera.lens).head(2)))
+                             : VectorXd(by_lens.col(*at) * lens.asked);
   cov += moved * moved.transpose();
 }
 
@@ -85,12 +91,12 @@ void set_moves(const MovingProblem& problem, const SolvedMoving& solved, const E
 }  // namespace
 
 MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved, const MovingTargetConfig& config) {
-  MovingGiven given{{}, solved.cov, solved.focals};
+  MovingGiven given{{}, solved.cov, solved.lenses};
   std::vector<Given> all;
   for (std::size_t h = 0; h < solved.state.heads.size(); ++h)
     if (problem.placed[h]) add_lens(solved.state.heads[h], solved.by_lens[h], all, given);
   if (config.distance) add_distance(problem, solved, *config.distance, all);
-  for (FocalScore& focal : given.focals) carry_asked(solved, focal, given.cov);
+  for (const LensScore& lens : given.lenses) carry_asked(solved, lens, given.cov);
   for (Given& one : all) {
     set_moves(problem, solved, given.cov, one);
     given.assumed.push_back(std::move(one.what));

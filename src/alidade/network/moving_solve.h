@@ -58,7 +58,7 @@ struct SolvedMoving {
   ClusterCovariance clusters;            ///< Blocks of time.
   double block_s = 0.0;                  ///< Length of one.
   std::vector<Eigen::MatrixXd> by_lens;  ///< One per head: how the shared parameters follow its lens's.
-  std::vector<FocalScore> focals;        ///< Without what the files give.
+  std::vector<LensScore> lenses;         ///< Without what the files give.
   double chi2_per_dof = 0.0;
   int iterations = 0;
   bool converged = false;
@@ -84,6 +84,14 @@ struct ObservationTerms {
 /// covariance is the model's. Throws Interrupted.
 [[nodiscard]] SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start,
                                         const Progress& progress, bool is_rough = false);
+
+/// What was rejected of each camera, and whether from a moment on.
+void note_rejected(const MovingProblem& problem, const SolvedMoving& solved, std::vector<LocatedCamera>& cameras);
+
+/// Of the time in which two or more cameras saw the target, what has no path: there they do not agree.
+void note_disagreement(const MovingProblem& problem, const MovingState& state,
+                       std::span<const ObservationSeries> series, std::span<const double> path_t_s,
+                       MovingTargetReport& report);
 
 /// A spline through points at times: least squares, as straight as it can where there are none.
 [[nodiscard]] PathSpline spline_through(std::span<const double> t_s, std::span<const Eigen::Vector3d> points,

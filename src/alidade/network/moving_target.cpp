@@ -191,6 +191,8 @@ void take_results(Placing& work) {
   for (std::size_t h = 0; h < work.heads.size(); ++h)
     if (report.cameras[h].num_used > 0)
       report.cameras[h].rms_px = std::sqrt(sum2[h] / static_cast<double>(report.cameras[h].num_used));
+  note_rejected(work.problem, solved, report.cameras);
+  note_disagreement(work.problem, solved.state, work.series, work.path_t_s, report);
   for (const double t_s : work.path_t_s) {
     const auto at = solved.state.path.support(t_s);
     if (!at) continue;
@@ -329,9 +331,12 @@ std::vector<TargetObservation> moved_to(double origin_s, std::span<const TargetO
 
 void move_back(double origin_s, MovingTargetReport& report) {
   const auto move = [origin_s](CameraClock& clock) { clock.offset_s += origin_s * (1.0 - clock.rate); };
-  for (LocatedCamera& camera : report.cameras)
+  for (LocatedCamera& camera : report.cameras) {
     if (camera.placed) move(camera.clock);
+    if (camera.moved) camera.moved->t_s += origin_s;
+  }
   move(report.truth_clock);
+  if (report.disagree) report.disagree->t_s += origin_s;
   for (double& t_s : report.path_t_s) t_s += origin_s;
 }
 

@@ -135,19 +135,58 @@ void put_worst_first(const MovingTargetReport& report, Verdict& verdict) {
                                                  worst / next, far_worse, "", ""});
 }
 
+std::string asked_text(const LensScore& lens) {
+  const std::string by = text_of(std::abs(lens.asked), 2);
+  switch (lens.part) {
+    case LensPart::focal:
+      return "a focal length " + text_of(100.0 * std::abs(lens.asked), 2) + " % " +
+             (lens.asked > 0.0 ? "longer" : "shorter") + " than its camera file's";
+    case LensPart::k1:
+      return "a distortion other than its camera file's, k1 by " + text_of(lens.asked, 2);
+    default:
+      return std::string("a principal point ") + by + " px " +
+             (lens.part == LensPart::cx ? lens.asked > 0.0 ? "right" : "left"
+              : lens.asked > 0.0        ? "below"
+                                        : "above") +
+             " of its camera file's";
+  }
+}
+
 /// The lens that the observations contradict most.
-void add_focals(const MovingTargetReport& report, Verdict& verdict) {
-  if (report.focals.empty()) return;
-  const FocalScore& most = *std::ranges::max_element(report.focals, {}, &FocalScore::sigmas);
-  const bool is_quiet = most.sigmas() < focal_limit;
-  const std::string text = is_quiet ? "no focal length is asked to be another"
+void add_lenses(const MovingTargetReport& report, Verdict& verdict) {
+  if (report.lenses.empty()) return;
+  const LensScore& most = *std::ranges::max_element(report.lenses, {}, &LensScore::rank);
+  const bool is_quiet = most.sigmas() < lens_limit;
+  const std::string text = is_quiet ? "no lens is asked to be another"
                                     : "head " + std::to_string(report.cameras[most.head].id) +
-                                          ": the observations ask for a focal length " +
-                                          text_of(100.0 * std::abs(most.asked), 2) + " % " +
-                                          (most.asked > 0.0 ? "longer" : "shorter") + " than its camera file's, by " +
+                                          ": the observations ask for " + asked_text(most) + ", by " +
                                           text_of(most.sigmas(), 2) + "σ: is the file of this lens at this zoom?";
-  verdict.checks.push_back(
-      {"focal lengths", is_quiet ? State::good : State::care, text, most.sigmas(), focal_limit, "σ", ""});
+  verdict.checks.push_back({"lenses", is_quiet ? State::good : State::care, text, most.sigmas(), lens_limit, "σ", ""});
+}
+
+/// A camera that was moved, by what was rejected: where it is holds for a part of the time.
+void add_rejected(const MovingTargetReport& report, Verdict& verdict) {
+  constexpr double many = 0.35;
+  const auto add = [&](const std::string& text, double value) {
+    verdict.checks.push_back({"observations", State::care, text, value, many, "", ""});
+  };
+  for (const LocatedCamera& camera : report.cameras)
+    if (camera.placed && camera.moved)
+      return add("head " + std::to_string(camera.id) + " was moved at " + text_of(camera.moved->t_s, 4) +
+                     " s, or its clock jumped: what it saw " + (camera.moved->agrees_before ? "after" : "before") +
+                     " that does not agree; give the table without it",
+                 camera.rejected);
+  if (report.disagree)
+    return add(std::string("the cameras agree ") + (report.disagree->agrees_before ? "until " : "from ") +
+                   text_of(report.disagree->t_s, 4) + " s" + (report.disagree->agrees_before ? "" : " on") +
+                   " only: one of them was moved then, or its clock jumped",
+               1.0 - report.agreeing);
+  for (const LocatedCamera& camera : report.cameras)
+    if (camera.placed && camera.rejected > many)
+      return add("head " + std::to_string(camera.id) + ": " + text_of(100.0 * camera.rejected, 2) +
+                     " % of its observations do not agree with the others': false labels, another target, or a camera "
+                     "that was moved",
+                 camera.rejected);
 }
 
 /// A true path in millimetres gives a rig of kilometres that fits as well.
@@ -212,10 +251,11 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
   Verdict verdict;
   add_precision(report, verdict);
   put_worst_first(report, verdict);  // what is wrong comes before what follows from it
-  Verdict focals;
-  add_focals(report, focals);
-  add_truth_clock(report, focals);
-  verdict.checks.insert(verdict.checks.begin(), focals.checks.begin(), focals.checks.end());
+  Verdict lenses;
+  add_rejected(report, lenses);
+  add_lenses(report, lenses);
+  add_truth_clock(report, lenses);
+  verdict.checks.insert(verdict.checks.begin(), lenses.checks.begin(), lenses.checks.end());
   add_cameras(report, verdict);
   add_truth(report, verdict);
   const auto first = [&](State state) {

@@ -43,6 +43,12 @@ struct CameraClock {
   [[nodiscard]] double in_rig(double t_s) const { return offset_s + rate * t_s; }
 };
 
+/// A moment before which, or after which, nearly all is rejected, and only few else.
+struct SplitMoment {
+  double t_s = 0.0;
+  bool agrees_before = true;
+};
+
 /// One camera after the solve.
 struct LocatedCamera {
   int id = 0;
@@ -53,18 +59,26 @@ struct LocatedCamera {
   double sigma_clock_s = 0.0, sigma_rate = 0.0;  ///< Of the clock amid its observations, and of its rate.
   double sigma_px = 0.0;                         ///< Of a coordinate.
   double rms_px = 0.0;                           ///< Per point, of the used observations.
+  double rejected = 0.0;                         ///< Share of its observations that do not agree with the path.
+  std::optional<SplitMoment> moved;              ///< By its clock.
 };
 
-/// The change of a camera's focal length that the observations indicate, all else estimated too: a score test.
-struct FocalScore {
+/// What is tested of a lens.
+enum class LensPart { focal, cx, cy, k1 };
+
+/// The change of a camera's lens that the observations indicate, all else estimated too: a score test.
+struct LensScore {
   std::size_t head = 0;
-  double asked = 0.0, sigma = 0.0;  ///< Of the focal length, relative; errors over time go together.
-  std::optional<double> given;      ///< σ with which its file gives it.
-  [[nodiscard]] double sigmas() const { return std::abs(asked) / std::hypot(sigma, given.value_or(0.0)); }
+  LensPart part = LensPart::focal;
+  double asked = 0.0, sigma = 0.0;  ///< Of both focal lengths, relative, or px, or k1; errors over time go together.
+  double given = 0.0;               ///< σ that it has by errors of all files as these state them.
+  [[nodiscard]] double sigmas() const { return std::abs(asked) / std::hypot(sigma, given); }
+  /// To compare by: another zoom is likelier than a bent lens.
+  [[nodiscard]] double rank() const { return sigmas() * (part == LensPart::focal ? 1.0 : 0.6); }
 };
 
-/// Beyond so many σ a focal length is reported as wrong, as a rig's causes are.
-constexpr double focal_limit = 4.2;
+/// Beyond so many σ a lens is reported as wrong, as a rig's causes are.
+constexpr double lens_limit = 4.2;
 
 struct MovingTargetReport {
   enum class Status {
@@ -89,13 +103,16 @@ struct MovingTargetReport {
   double block_s = 0.0;             ///< Length of a block.
   std::string camera_fault;         ///< What is wrong with a camera, where that is identified; empty: nothing.
   std::vector<Assumption> assumed;  ///< Lenses and the distance.
-  std::vector<FocalScore> focals;   ///< One per located camera of which the observations determine it.
+  std::vector<LensScore> lenses;    ///< Of located cameras, what the observations determine.
   double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
   double sigma_world_m = 0.0, sigma_world_rad = 0.0;        ///< The same in the true path's frame; 0 without one.
   /// With a true path: its clock (time of the rig by its own), and the residuals of the similarity, over the path.
   CameraClock truth_clock;
   double truth_median_m = 0.0, truth_rms_m = 0.0;
-  double truth_covered = 0.0;  ///< Share of the path that it covers.
+  /// Share of the time in which two or more located cameras saw the target that has a path.
+  double agreeing = 1.0;
+  std::optional<SplitMoment> disagree;  ///< Time of the rig.
+  double truth_covered = 0.0;           ///< Share of the path that it covers.
   /// By how much its times are late where clocks are not searched, and σ [s].
   double truth_late_s = 0.0, sigma_truth_late_s = 0.0;
   int iterations = 0;

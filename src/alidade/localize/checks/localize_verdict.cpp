@@ -359,6 +359,15 @@ void conclude(const Localization& report, Verdict& verdict) {
   }
 }
 
+/// A filter's linearisation of points that enter leaves what another lens would: it is judged where the target is in
+/// sight in four frames of five.
+bool shows_target(const Localization& recent) {
+  constexpr std::size_t least_known = 4;
+  const auto num = std::ranges::count_if(
+      recent.path, [](const PathStep& step) { return step.num_known >= step.num_known_gated + least_known; });
+  return 5 * num >= 4 * std::ssize(recent.path);
+}
+
 }  // namespace
 
 State state_of(double value, double care, double bad) {
@@ -377,8 +386,8 @@ Verdict localize_verdict(const Localization& report) {
 Verdict live_verdict(const Localization& recent) {
   if (std::ranges::none_of(recent.path, &PathStep::has_pose)) return never_started(recent);
   Verdict verdict;
-  for (const auto add : {add_innovations, add_losses, add_restarts, add_given, add_radial, add_side})
-    add(recent, verdict);
+  for (const auto add : {add_innovations, add_losses, add_restarts, add_radial, add_side}) add(recent, verdict);
+  if (shows_target(recent)) add_given(recent, verdict);
   for (Check& check : verdict.checks)
     if (check.name == "radial structure" && check.state != State::good)
       check.text += ", or the filter's first map was wrong: the path at the end tells";

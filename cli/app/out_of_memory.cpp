@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <csignal>
 #include <cstdlib>
 #include <exception>
 #include <new>
@@ -27,6 +28,13 @@ void release_reserve() {
     }
   }
   throw std::bad_alloc();
+}
+
+/// glibc ends a process for which it cannot register the destructor of a thread's object, with a line of its own.
+extern "C" void on_abort(int) {
+  tell_without_memory(
+      "alidade: error: internal: a library ended the process: not enough memory, or a bug; please report it\n");
+  ::_exit(static_cast<int>(ExitCode::internal_error));
 }
 
 /// Without an allocation, unlike the standard one's names of exceptions.
@@ -59,6 +67,7 @@ void prepare_for_out_of_memory() {
   }
   std::set_new_handler(release_reserve);
   std::set_terminate(end_in_one_line);
+  std::signal(SIGABRT, on_abort);
 }
 
 }  // namespace alidade::cli

@@ -134,7 +134,6 @@ struct RigReport {
   /// σ of where another head's camera (else the camera after a rotation, against where it started) stands, over the
   /// angles covered: what the calibration is for.
   double sigma_relative_rad = 0.0, sigma_relative_m = 0.0;
-  double board_distance_m = 0.0;                    ///< Of half of the views at least.
   double sigma_span_rad = 0.0, sigma_span_m = 0.0;  ///< The same over good_span_rad where less is covered.
   int views_used = 0, views_dropped = 0, iterations = 0;
 

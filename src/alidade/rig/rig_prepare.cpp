@@ -135,10 +135,6 @@ void fit_poses(Work& work) {
   work.report.sigma_px_is_estimated = !work.config.sigma_px && given_px > 0.0;
   work.report.sigma_px = work.config.sigma_px ? *work.config.sigma_px : given_px > 0.0 ? std::max(given_px, 1e-3) : 0.5;
   work.problem.sigma_px = work.report.sigma_px;
-  std::vector<double> distances_m;
-  for (const auto& pose : work.poses)
-    if (pose) distances_m.push_back(pose->pose.cam_from_board.translation.norm());
-  work.report.board_distance_m = median_of(distances_m);
   constexpr double max_sigmas = 6.0;  // of one view's own residuals: blurred is not wrong, a wrong corner is
   for (std::size_t v = 0; v < work.given.size(); ++v) {
     if (!work.usable[v]) continue;

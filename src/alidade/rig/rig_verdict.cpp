@@ -10,14 +10,8 @@ namespace alidade {
 namespace {
 
 using RigStatus = RigReport::Status;
-constexpr double good_relative_rad = 0.2 * degree, near_relative_m = 0.0035;  // of a use in tracking
-constexpr double refuse_relative_rad = 2.0 * degree, refuse_by_good = 0.05 / near_relative_m;
-
-/// Of boards, and what is tracked, farther away than is usual a good position is as much less exact.
-double good_relative_m(const RigReport& report) {
-  constexpr double usual_m = 1.5;
-  return near_relative_m * std::max(1.0, report.board_distance_m / usual_m);
-}
+constexpr double good_relative_rad = 0.2 * degree, good_relative_m = 0.0035;  // of a use in tracking
+constexpr double refuse_relative_rad = 2.0 * degree, refuse_relative_m = 0.05;
 
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
@@ -127,7 +121,7 @@ Check check_of(std::string name, State state, std::string text, double value, do
 /// How many more views like these bring both σ down to what is good: they fall as the root of the number.
 std::string views_lacking(const RigReport& report) {
   const double times =
-      std::max(report.sigma_relative_rad / good_relative_rad, report.sigma_relative_m / good_relative_m(report));
+      std::max(report.sigma_relative_rad / good_relative_rad, report.sigma_relative_m / good_relative_m);
   constexpr double most_times = 3.0;  // nine times as many views: nobody takes these
   if (times > most_times) return "; more views alone do not suffice: boards nearer or larger, at more pans and tilts";
   const double lacking = std::ceil(static_cast<double>(report.views.size()) * (times * times - 1.0));
@@ -146,14 +140,13 @@ void add_precision(const RigReport& report, Verdict& verdict) {
                                       value / unit, good / unit, symbol));
   };
   add("rotation", report.sigma_relative_rad, good_relative_rad, refuse_relative_rad, degree, "°", "");
-  add("position", report.sigma_relative_m, good_relative_m(report), refuse_by_good * good_relative_m(report), 1e-3,
-      "mm", " ");
+  add("position", report.sigma_relative_m, good_relative_m, refuse_relative_m, 1e-3, "mm", " ");
 }
 
 /// A small range of an axis is enough where the views determine the rig beyond it, too: what counts is σ over 20° of
 /// each axis, not how far each happened to move.
 void add_spans(const RigReport& report, Verdict& verdict) {
-  const bool is_known = report.sigma_span_rad < good_relative_rad && report.sigma_span_m < good_relative_m(report);
+  const bool is_known = report.sigma_span_rad < good_relative_rad && report.sigma_span_m < good_relative_m;
   for (const HeadCover& cover : report.covers) {
     for (int axis = 0; axis < 2; ++axis) {
       const double span = cover.highest_rad[axis] - cover.lowest_rad[axis];

@@ -64,12 +64,13 @@ def _is_image(value: Any) -> bool:
 def _are_images(value: Any) -> bool:
     """Several images (N, H, W[, 3]), or a list of them."""
     if isinstance(value, np.ndarray):
-        return value.dtype.kind == "u" and value.ndim == 4 or value.ndim == 3 and value.shape[2] not in (1, 3, 4)
+        return value.dtype.kind == "u" and (value.ndim == 4 or value.ndim == 3 and value.shape[2] not in (1, 3, 4))
     return isinstance(value, (list, tuple)) and len(value) > 0 and all(isinstance(each, np.ndarray) for each in value)
 
 
 def _is_column(value: Any) -> bool:
-    return hasattr(value, "__len__") and not isinstance(value, (str, abc.Mapping))
+    is_nested = isinstance(value, (list, tuple)) and any(isinstance(each, abc.Mapping) for each in value)
+    return hasattr(value, "__len__") and not isinstance(value, (str, abc.Mapping)) and not is_nested
 
 
 class _Files:
@@ -148,6 +149,8 @@ class _Files:
             return [self._put_images(value, name)]
         if re.fullmatch(r"[A-Z][A-Za-z]*x[A-Z][A-Za-z]*", form):
             return ["{}x{}".format(*image_size(value, name))] if name == "size" else texts_of(value, name, pair=True)
+        if isinstance(value, np.ndarray) and value.ndim > 1:
+            raise ValueError(f"{name}: a file, or columns by their names, are needed, not an array {value.shape}")
         if isinstance(value, (list, tuple)):
             return [self.path_of(each, name) for each in value]
         return texts_of(value, name)
@@ -163,6 +166,7 @@ def files_for_call() -> abc.Iterator[_Files]:
             said = str(error)
             for file, name in files.names:
                 said = said.replace(file, name)
+            said = said.replace(folder + os.sep, "")
             raise ValueError(said) from None
 
 
@@ -237,7 +241,7 @@ def run_calibrate(function: Callable[..., Any], values: dict[str, Any], aliases:
         raise ValueError("give photos, or corners=" if take["photos"] is None else "corners replace photos")
     texts = [(name, texts_of(value, name)) for name, value in given.items() if value is not None]
     if air is not None and not isinstance(air, Camera):
-        air = Camera.read(air)
+        air = Camera.read(text_of(air, "air"))
     camera = None if air is None else air._core
     points = np.zeros((0, 3)) if take["board_points"] is None else _board_points(take["board_points"])
     rest = (board._core, texts, camera, points, progress)

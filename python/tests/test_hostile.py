@@ -1,4 +1,5 @@
 """Whatever comes in is answered or refused in one line; many threads, and many calls, leave nothing."""
+import re
 import threading
 import unittest
 
@@ -88,6 +89,29 @@ class Hostile(InFolder):
                 with self.assertRaises(ValueError) as caught:
                     work()
                 self.assertTrue(str(caught.exception).isprintable(), str(caught.exception))
+
+    def refusals(self, cases):
+        for work, said in cases:
+            with self.assertRaises(ValueError) as caught:
+                work()
+            self.assertEqual(str(caught.exception), said)
+
+    def test_files_that_python_made_are_not_named(self):
+        shots = {"range_m": [1.0, 2.0], "photo": ["a.png", "b.png"]}
+        self.refusals([(lambda: al.observe(np.zeros((5, 3))), "log: a file, or columns by their names, are needed, not an array (5, 3)"),
+                       (lambda: al.rangefinder(shots, camera=TRUE_CAMERA, board=BOARD),
+                        "shots:2: photo 'a.png': a.png: cannot be read: No such file or directory")])
+
+    def test_a_target_is_nested_values_or_its_file(self):
+        al.simulate.underwater(frames=20, seed=2).save(self.folder / "water")
+        file = self.folder / "water" / "target.yaml"
+        points = [{key: float(value) for key, value in re.findall(r"(\w+): ([-+.e\d]+)", line)}
+                  for line in file.read_text().splitlines() if "{" in line]
+        values = {"points": [{**point, "id": int(point["id"])} for point in points]}
+        by_values, by_file = (al.localize(self.folder / "water" / "sights.csv", camera=self.folder / "water" / "camera.yaml", target=target)
+                              for target in (values, file))
+        self.assertTrue(by_values.verdict)
+        self.assertEqual(by_values.estimate, by_file.estimate)
 
     def test_layouts_and_read_only_arrays(self):
         corners = board_corners(num_views=8)

@@ -8,6 +8,8 @@
 #include <limits>
 #include <numbers>
 
+#include "alidade/camera/camera_fault.h"
+#include "alidade/geometry/covariance.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/track/checks/track_assumed.h"
@@ -213,20 +215,8 @@ Check units_check(const Beam& beam, const std::vector<double>& ranges_m, std::op
   return check;
 }
 
-/// Whether it is a covariance: some combination of more than two parameters may have a negative variance.
-bool is_covariance(const Eigen::MatrixXd& cov) {
-  constexpr double rounding = 1e-4;  // of correlations that a file rounds
-  if (cov.size() == 0) return true;
-  if (!cov.allFinite() || cov.diagonal().minCoeff() < 0.0) return false;
-  const Eigen::VectorXd scale =
-      cov.diagonal().unaryExpr([](double variance) { return variance > 0.0 ? 1.0 / std::sqrt(variance) : 0.0; });
-  return symmetric_eigenvalues(scale.asDiagonal() * cov * scale.asDiagonal()).minCoeff() > -rounding;
-}
-
 void require_camera(const Camera& camera) {
-  const std::string of_camera = fault(RigHead{{}, camera});
-  if (!of_camera.empty()) throw ConfigError("the camera: " + of_camera);
-  if (!is_covariance(camera.cov)) throw ConfigError("the camera: its covariance has a negative variance");
+  if (const std::string of_camera = fault(camera); !of_camera.empty()) throw ConfigError(of_camera);
 }
 
 void require_sense(const Beam& beam, const std::vector<double>& ranges_m) {
@@ -331,8 +321,8 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
       std::ranges::count_if(result.readings, [](const ProjectedReading& one) { return one.pixel.has_value(); });
   result.counts.given = result.readings.size();
   result.counts.used = static_cast<std::size_t>(num_seen);
-  result.verdict.sentence = fmt::format("{} of {} point{} in the image's model", num_seen, result.readings.size(),
-                                        result.readings.size() == 1 ? "" : "s");
+  result.verdict.sentence = fmt::format("{} of {} point{} a pixel", num_seen, result.readings.size(),
+                                        result.readings.size() == 1 ? " has" : "s have");
   add_beam_assumptions(result.beam, camera, result.readings, result.assumed);
   add_camera_assumptions(camera, result.readings, result.assumed);
   heed(units_check(beam, ranges_m, config.sigma_range_m), "give lengths in metres: 2310 mm are --range 2.31",
@@ -353,7 +343,7 @@ RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, c
     throw ConfigError("intrinsics: change with time, which `project` is not given; give a camera");
   check_angles(pans_rad, "--pan", rig.heads.size());
   check_angles(tilts_rad, "--tilt", rig.heads.size());
-  if (point_in_world && !(point_in_world->cwiseAbs().maxCoeff() <= max_length_m))
+  if (point_in_world && !(point_in_world->allFinite() && point_in_world->cwiseAbs().maxCoeff() <= max_length_m))
     throw ConfigError("the point must be finite, and within 1000 km");
   const RigUncertainty errors = rig_uncertainty(rig);
   RigProjection result;
@@ -375,8 +365,7 @@ RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, c
     result.verdict.sentence = fmt::format("{} projection matrices", rig.heads.size());
     return result;
   }
-  result.verdict.sentence =
-      fmt::format("{} of {} heads have the point in their observation", seen_by.size(), rig.heads.size());
+  result.verdict.sentence = fmt::format("{} of {} heads have a pixel of the point", seen_by.size(), rig.heads.size());
   result.point_cov = covariance_of_point(rig, errors, seen_by, *point_in_world);
   heed(image_check(rig, result.heads), "check the angles and the point", result.verdict);
   heed(files_check(rig), "use files with their covariance: alidade calibrate and alidade rig write it", result.verdict);

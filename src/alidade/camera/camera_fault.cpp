@@ -1,5 +1,7 @@
 #include "alidade/camera/camera_fault.h"
 
+#include "alidade/geometry/covariance.h"
+
 namespace alidade {
 
 std::string fault(const Camera& camera) {
@@ -8,9 +10,11 @@ std::string fault(const Camera& camera) {
   if (!lens.allFinite() || !(lens.head<2>().minCoeff() > 0.0)) {
     return "the camera's parameters must be finite, fx and fy above 0";
   }
-  const bool has_cov = camera.cov.size() > 0;
-  const bool is_cov = camera.cov.rows() == lens.size() && camera.cov.cols() == lens.size() && camera.cov.allFinite();
-  return has_cov && !is_cov ? "the camera's covariance must be finite, of all parameters of the lens" : "";
+  if (camera.cov.size() == 0) return "";
+  const bool is_of_lens = camera.cov.rows() == lens.size() && camera.cov.cols() == lens.size();
+  if (!is_of_lens || !camera.cov.allFinite())
+    return "the camera's covariance must be finite, of all parameters of the lens";
+  return is_covariance(camera.cov) ? "" : "the camera's covariance is not symmetric, or has a negative variance";
 }
 
 }  // namespace alidade

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <set>
 
-#include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/covariance.h"
 
 namespace alidade::detail {
 
@@ -164,13 +164,6 @@ std::vector<Eigen::Index> places_of(const std::vector<std::string>& names, const
   return places;
 }
 
-/// No eigenvalue of the correlations below zero by more than digits were cut off.
-bool is_positive(const Eigen::MatrixXd& cov) {
-  const Eigen::VectorXd sigma = cov.diagonal().cwiseSqrt();
-  const Eigen::VectorXd scale = sigma.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
-  return symmetric_eigenvalues(scale.asDiagonal() * cov * scale.asDiagonal()).minCoeff() >= -1e-6;
-}
-
 void refuse_impossible(const Eigen::MatrixXd& cov, const std::vector<std::string>& known, const Fields& fields) {
   for (Eigen::Index i = 0; i < cov.rows(); ++i) {
     for (Eigen::Index j = 0; j < cov.rows(); ++j) {
@@ -180,7 +173,7 @@ void refuse_impossible(const Eigen::MatrixXd& cov, const std::vector<std::string
                          known[static_cast<std::size_t>(i)], known[static_cast<std::size_t>(j)]));
     }
   }
-  if (!is_positive(cov))
+  if (!is_covariance(cov))
     refuse(fields.file(), fields.full("upper"), "is not a covariance: an eigenvalue is below zero");
 }
 

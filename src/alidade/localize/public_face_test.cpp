@@ -163,6 +163,13 @@ TEST(LocalizeFace, AnswersValuesThatCannotBe) {
   EXPECT_EQ(fault_of(config, testing::hover::camera_of(testing::HoverLens::fisheye)),
             "--distortion: only a brown lens can be given less than full distortion");
   EXPECT_NE(fault_of({}, Camera{}), "");
+  Camera camera = short_run(1).camera;
+  const Eigen::VectorXd lens = params(camera.lens);
+  camera.cov = -Eigen::MatrixXd::Identity(lens.size(), lens.size());
+  EXPECT_THAT(fault_of({}, camera), ::testing::HasSubstr("negative variance"));
+  camera.cov.resize(0, 0);
+  camera.lens = with_params(camera.lens, -lens);
+  EXPECT_THAT(fault_of({}, camera), ::testing::HasSubstr("fx and fy above 0"));
 }
 
 TEST(LocalizeFace, AnswersFramesThatCannotBe) {

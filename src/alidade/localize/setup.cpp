@@ -8,6 +8,7 @@
 #include <limits>
 #include <set>
 
+#include "alidade/camera/camera_fault.h"
 #include "alidade/estimation/config_error.h"
 #include "alidade/localize/filter/filter.h"
 #include "alidade/localize/frames/image_localizer.h"
@@ -68,12 +69,7 @@ FieldList inner_fields(LocalizeConfig& config) {
 }
 
 void add_faults(const Camera& camera, Sentences& found) {
-  if (camera.width_px < 1 || camera.height_px < 1) found.emplace_back("the camera has no image size");
-  const Eigen::VectorXd values = params(camera.lens);
-  if (!values.allFinite()) found.emplace_back("the camera has parameters that are not finite");
-  if (camera.cov.size() > 0 &&
-      (camera.cov.rows() != values.size() || camera.cov.cols() != values.size() || !camera.cov.allFinite()))
-    found.emplace_back("the camera's covariance is not of its parameters");
+  if (std::string of_camera = fault(camera); !of_camera.empty()) found.push_back(std::move(of_camera));
 }
 
 void add_faults(const LocalizeTarget& target, Sentences& found) {

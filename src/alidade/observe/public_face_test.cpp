@@ -143,6 +143,11 @@ TEST(ObserveFace, AnswersEveryHostileNumber) {
   refuses([](ObserveConfig& config) { config.width_px = -780; });
   refuses([](ObserveConfig& config) { config.height_px = 0; });
   refuses([](ObserveConfig& config) { config.camera = Camera{}; });
+  refuses([](ObserveConfig& config) {
+    config.camera = Camera{780, 582, *make_lens("pinhole"), {}, 0.0, ""};
+    config.camera->lens = with_params(config.camera->lens, Eigen::VectorXd::Constant(5, 600.0));
+    config.camera->cov = -Eigen::MatrixXd::Identity(5, 5);
+  });
   refuses([](ObserveConfig& config) { config.method = static_cast<ObserveMethod>(77); });
   refuses([](ObserveConfig& config) { config.rotation = static_cast<RotationKnowledge>(77); });
   refuses([](ObserveConfig& config) { config.profile = static_cast<FangProfile>(77); });

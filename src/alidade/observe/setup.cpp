@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/camera/camera_fault.h"
 #include "alidade/estimation/config_error.h"
 #include "alidade/observe/solve/solve.h"
 
@@ -38,13 +39,7 @@ void check_codes(const FieldList& fields, Faults& faults) {
 }
 
 std::string camera_fault(const Camera& camera) {
-  if (!is_central(camera.lens)) return "the camera has no single viewpoint: give a central one";
-  const Eigen::VectorXd values = params(camera.lens);
-  if (!values.allFinite()) return "the camera's parameters are not finite";
-  if (camera.width_px < 1 || camera.height_px < 1) return "the camera has no image size";
-  const bool is_covariance = camera.cov.size() == 0 || (camera.cov.rows() == values.size() && camera.cov.allFinite() &&
-                                                        camera.cov.cols() == values.size());
-  return is_covariance ? "" : "the camera's covariance is not of its parameters";
+  return is_central(camera.lens) ? fault(camera) : "the camera has no single viewpoint: give a central one";
 }
 
 /// Of a lens with its covariance; none: not given. A lens without k1 is one that a board was calibrated with: 0.

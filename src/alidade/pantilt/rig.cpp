@@ -3,21 +3,27 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
+
+#include "alidade/camera/camera_fault.h"
+#include "alidade/geometry/covariance.h"
 
 namespace alidade {
 namespace {
 
-bool is_covariance_of(const Eigen::MatrixXd& cov, Eigen::Index num) {
-  return cov.size() == 0 || (cov.rows() == num && cov.cols() == num && cov.allFinite());
+/// What is wrong with a covariance of `num` parameters; empty where nothing is, or where there is none.
+std::string covariance_fault(const Eigen::MatrixXd& cov, Eigen::Index num, const std::string& what,
+                             const std::string& of_what) {
+  const bool is_of_it = cov.size() == 0 || (cov.rows() == num && cov.cols() == num && cov.allFinite());
+  if (!is_of_it) return what + " is not of " + of_what;
+  return is_covariance(cov) ? "" : what + " is not symmetric, or has a negative variance";
 }
 
 }  // namespace
 
 std::string fault(const RigHead& rig_head) {
   const auto& [head, camera] = rig_head;
-  const Eigen::VectorXd lens = params(camera.lens);
   const Encoder& encoder = head.encoder;
-  const bool is_lens = lens.allFinite() && lens[0] > 0.0 && lens[1] > 0.0;
   const bool is_mounted = head.world_from_base.translation.allFinite() && head.pan_to_tilt_m.allFinite() &&
                           head.tilt_to_cam_m.allFinite() && std::isfinite(head.axes_skew_rad);
   constexpr double off = 1e-6;  // of a quaternion's norm
@@ -26,11 +32,7 @@ std::string fault(const RigHead& rig_head) {
   const Eigen::Vector2d zero = encoder.readings(Eigen::Vector2d::Zero());
   const bool is_encoder = zero.allFinite() && encoder.pan_scale != 0.0 && encoder.tilt_scale != 0.0 &&
                           encoder.sigma_rad >= 0.0 && std::isfinite(encoder.sigma_rad);
-  if (camera.width_px < 1 || camera.height_px < 1) return "its camera has no image size";
-  if (!is_lens) return "its camera's parameters must be finite, and focal lengths above zero";
-  if (camera.cov.size() > 0 &&
-      (camera.cov.rows() != lens.size() || camera.cov.cols() != lens.size() || !camera.cov.allFinite()))
-    return "its camera's covariance is not of the lens' parameters";
+  if (std::string of_camera = fault(camera); !of_camera.empty()) return of_camera;
   if (!is_mounted || !is_rotation) return "its mounting must be finite, and its rotations of unit norm";
   return is_encoder ? "" : "its encoders must be finite, with scales other than zero and σ not below";
 }
@@ -38,14 +40,23 @@ std::string fault(const RigHead& rig_head) {
 std::string fault(const Rig& rig) {
   const std::size_t num_heads = rig.heads.size();
   Eigen::Index num = num_head_params * static_cast<Eigen::Index>(num_heads);
-  if (!is_covariance_of(rig.cov, num)) return "the rig's covariance is not of its heads' parameters";
+  if (std::string of_cov = covariance_fault(rig.cov, num, "the rig's covariance", "its heads' parameters");
+      !of_cov.empty())
+    return of_cov;
+  std::set<int> ids;
   for (const RigHead& head : rig.heads) {
+    if (!ids.insert(head.head.id).second) return fmt::format("two heads have the id {}", head.head.id);
     const std::string what = fault(head);
     if (!what.empty()) return fmt::format("head {}: {}", head.head.id, what);
     num += params(head.camera.lens).size();
   }
-  if (!is_covariance_of(rig.cov_with_lenses, num))
-    return "the rig's covariance with its lenses is not of their parameters";
+  if (std::string of_cov =
+          covariance_fault(rig.cov_with_lenses, num, "the rig's covariance with its lenses", "their parameters");
+      !of_cov.empty())
+    return of_cov;
+  if (!rig.encoder_errors.empty() && rig.encoder_errors.size() != num_heads)
+    return fmt::format("the rig has {} heads, but errors of {} encoders are given", num_heads,
+                       rig.encoder_errors.size());
   if (!rig.intrinsics_histories.empty() && rig.intrinsics_histories.size() != num_heads)
     return fmt::format("the rig has {} heads, but intrinsics over time for {} are given", num_heads,
                        rig.intrinsics_histories.size());

@@ -135,6 +135,7 @@ TEST(ProjectFace, HeadsSeeAPoint) {
   EXPECT_GT((*result.point_cov)(2, 2), (*result.point_cov)(0, 0));                // along the view
   EXPECT_EQ(outcome_of(result).document.counts.given, 2u);
   EXPECT_FALSE(project_rig(two_heads(), {0.0}, {0.0}).point_cov);
+  EXPECT_THROW((void)project_rig(two_heads(), {0.0}, {0.0}, Eigen::Vector3d(0.2, std::nan(""), 2.0)), ConfigError);
 }
 
 TEST(ProjectFace, AnswersEveryMisuse) {

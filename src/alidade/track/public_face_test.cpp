@@ -201,7 +201,10 @@ TEST(TrackFace, AnswersRigsAndObservationsThatCannotBe) {
   refuses([](TargetObservation&, Rig& rig) { rig.cov = Eigen::MatrixXd::Identity(3, 3); });
   refuses([](TargetObservation&, Rig& rig) { rig.cov_with_lenses = Eigen::MatrixXd::Identity(3, 3); });
   refuses([](TargetObservation&, Rig& rig) { rig.heads[0].camera.cov = Eigen::MatrixXd::Identity(2, 2); });
+  refuses([](TargetObservation&, Rig& rig) { rig.cov = -Eigen::MatrixXd::Identity(48, 48); });
   refuses([](TargetObservation&, Rig& rig) { rig.intrinsics_histories.resize(1); });
+  refuses([](TargetObservation&, Rig& rig) { rig.encoder_errors.resize(1); });
+  refuses([](TargetObservation&, Rig& rig) { rig.heads[1].head.id = rig.heads[0].head.id; });
   EXPECT_THROW((void)track(given, rig_of(scene), {}, {.t_s = {0.0, 1.0}, .position = {}}), ConfigError);
 }
 

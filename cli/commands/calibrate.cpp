@@ -118,7 +118,6 @@ ExitCode calibrate_corners(const CalibrateArgs& args, Run& run) {
     run.say(fmt::format("image size {}x{} is the least that holds the corners: give --size WIDTHxHEIGHT", size.width_px,
                         size.height_px));
   }
-  require_corners_inside(size, args.corners, views);
   const Calibration result = alidade::calibrate(std::move(views), size, args.board, args.config, run.progress);
   run.lap("solve");
   require_size(args, size);

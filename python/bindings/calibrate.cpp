@@ -108,8 +108,13 @@ std::vector<BoardView> views_of(const std::vector<std::string>& names, const Arr
   return views;
 }
 
-OutcomePtr from_views(std::vector<BoardView> views, std::vector<SkippedInput> skipped, ImageSize size,
+/// `given`: width and height; 0: the lens' in air, else the least that holds the corners.
+OutcomePtr from_views(std::vector<BoardView> views, std::vector<SkippedInput> skipped, std::pair<int, int> given,
                       const Board& board, const CalibrateConfig& config, const py::object& progress) {
+  const std::optional<Camera>& air = config.port.air;
+  ImageSize size{given.first, given.second};
+  if (size.width_px == 0 && air) size = {air->width_px, air->height_px};
+  if (size.width_px == 0) size = min_size(views);
   return value_of<OutcomePtr>(
       [=](const Progress& report) {
         Laps laps;
@@ -128,11 +133,7 @@ OutcomePtr from_corners(const std::vector<std::string>& names, const Array& corn
                         std::pair<int, int> size, const Board& board, const Texts& values,
                         const std::optional<Camera>& air, const Array& board_points, const py::object& progress) {
   std::vector<BoardView> views = views_of(names, corners, covariances);
-  ImageSize image{size.first, size.second};
-  if (image.width_px == 0 && air) image = {air->width_px, air->height_px};
-  if (image.width_px == 0) image = min_size(views);
-  require_corners_inside(image, "corners", views);
-  return from_views(std::move(views), {}, image, board, config_of(values, air, board_points), progress);
+  return from_views(std::move(views), {}, size, board, config_of(values, air, board_points), progress);
 }
 
 OutcomePtr from_corner_file(const std::string& file, bool skip_bad, std::pair<int, int> size, const Board& board,
@@ -140,11 +141,7 @@ OutcomePtr from_corner_file(const std::string& file, bool skip_bad, std::pair<in
                             const py::object& progress) {
   std::vector<SkippedInput> skipped;
   std::vector<BoardView> views = read_corners(file, num_points(board), skip_bad ? &skipped : nullptr);
-  ImageSize image{size.first, size.second};
-  if (image.width_px == 0 && air) image = {air->width_px, air->height_px};
-  if (image.width_px == 0) image = min_size(views);
-  require_corners_inside(image, file, views);
-  return from_views(std::move(views), std::move(skipped), image, board, config_of(values, air, board_points), progress);
+  return from_views(std::move(views), std::move(skipped), size, board, config_of(values, air, board_points), progress);
 }
 
 /// Corners P × 2 (NaN: not seen), covariances P × 2 × 2, and why there are none ("" where there are).

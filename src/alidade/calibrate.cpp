@@ -1,8 +1,11 @@
 #include "alidade/calibrate.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
+#include "alidade/board/board_fields.h"
 #include "alidade/board/dictionary.h"
 #include "alidade/calibrate/checks/judge.h"
 #include "alidade/calibrate/setup.h"
@@ -39,6 +42,8 @@ void require_sense(CalibrateConfig config, const Board& board) {
     found.push_back("the board has " + std::to_string(num_points(board)) + " points, but " + std::to_string(num_given) +
                     " are given");
   }
+  if (config.board_shape != BoardShape::given && num_given > 0)
+    found.emplace_back("board_points are of BoardShape::given, and another shape is asked for");
   if (found.empty()) found = faults(config);
   std::string sentence;
   for (const std::string& each : found) sentence += (sentence.empty() ? "" : "; ") + each;
@@ -58,11 +63,46 @@ std::string corner_fault(const Corner& corner, int num_points) {
 void require_sense(std::span<const BoardView> views, const ImageSize& size, const Board& board) {
   if (size.width_px < 1 || size.height_px < 1) throw ConfigError("the size of the images must be given");
   for (const BoardView& view : views) {
+    std::vector<bool> seen(static_cast<std::size_t>(num_points(board)));
     for (const Corner& corner : view.corners) {
       const std::string what = corner_fault(corner, num_points(board));
-      if (!what.empty()) throw ConfigError(view.photo + ": corner " + std::to_string(corner.index) + ": " + what);
+      if (!what.empty()) throw ConfigError(fmt::format("{}: corner {}: {}", view.photo, corner.index, what));
+      std::vector<bool>::reference is_seen = seen[static_cast<std::size_t>(corner.index)];
+      if (is_seen) throw ConfigError(fmt::format("{}: corner {} appears twice", view.photo, corner.index));
+      is_seen = true;
     }
   }
+}
+
+/// Corners outside the images: of images of another size. A few may be wrong corners; more than one in ten are refused.
+Check inside_check(std::span<const BoardView> views, const ImageSize& size) {
+  Check check{.name = "corners inside", .text = "all corners are inside the images", .unit = "corners"};
+  std::size_t num_outside = 0, num = 0;
+  for (const BoardView& view : views) {
+    for (const Corner& corner : view.corners) {
+      const bool is_inside =
+          corner.px.minCoeff() > -1.0 && corner.px.x() < size.width_px && corner.px.y() < size.height_px;
+      num_outside += is_inside ? 0 : 1;
+      ++num;
+    }
+  }
+  if (num_outside == 0) return check;
+  check.state = State::care;
+  check.value = static_cast<double>(num_outside);
+  check.text =
+      fmt::format("{} of {} corners lie outside images of {}x{} px", num_outside, num, size.width_px, size.height_px);
+  if (10 * num_outside > num) throw ConfigError(check.text + ": check the size");
+  return check;
+}
+
+/// Squares that no printed board has: of another unit. The lens is right with them, the poses are not.
+Check square_check(const Board& board) {
+  Check check{.name = "square", .text = "the squares are of a size that is printed", .value = board.square_m};
+  check.unit = "m";
+  if (board.square_m >= min_square_m && board.square_m <= max_square_m) return check;
+  check.state = State::care;
+  check.text = fmt::format("the board's squares are {:.3g} m wide: square_m is in metres", board.square_m);
+  return check;
 }
 
 /// A fixed lens must be of images of that size.
@@ -75,6 +115,15 @@ void refuse_foreign_air(const CalibrateConfig& config, PhotoCalibration& solved)
   solved.report.to_add = "give the camera file of photos of the same size";
 }
 
+Calibration judged(PhotoCalibration solved, const Board& board, const CalibrateConfig& config,
+                   const Progress& progress) {
+  refuse_foreign_air(config, solved);
+  Calibration result = judge_calibration(board, std::move(solved), config, config.port.air, progress);
+  const Check square = square_check(board);
+  if (square.state != State::good) heed(square, "give square_m in metres: 25 mm are 0.025", result.verdict);
+  return result;
+}
+
 }  // namespace
 
 Calibration calibrate(const Photos& photos, const Board& board, const CalibrateConfig& config,
@@ -84,8 +133,7 @@ Calibration calibrate(const Photos& photos, const Board& board, const CalibrateC
   if (!photos.load && !photos.names.empty()) throw ConfigError("photos have names, but nothing that loads them");
   if (used.outliers == OutlierRule::automatic) used.outliers = OutlierRule::drop;  // found corners have covariances
   PhotoCalibration solved = calibrate_photos(photos.names, photos.load, board, used, used.board_points, progress);
-  refuse_foreign_air(used, solved);
-  return judge_calibration(board, std::move(solved), used, used.port.air, progress);
+  return judged(std::move(solved), board, used, progress);
 }
 
 Calibration calibrate(std::vector<BoardView> views, const ImageSize& size, const Board& board,
@@ -93,6 +141,7 @@ Calibration calibrate(std::vector<BoardView> views, const ImageSize& size, const
   CalibrateConfig used = resolved(config);
   require_sense(used, board);
   require_sense(views, size, board);
+  const Check inside = inside_check(views, size);
   const bool have_sigma = have_covariances(views);
   if (used.outliers == OutlierRule::automatic) used.outliers = have_sigma ? OutlierRule::drop : OutlierRule::keep;
   // Corners without σ are judged as they are: the same corners, the same optimum.
@@ -102,8 +151,9 @@ Calibration calibrate(std::vector<BoardView> views, const ImageSize& size, const
   solved.reasons.resize(solved.views.size());
   solved.size = size;
   solved.report = calibrate(board, solved.views, size, used, used.board_points);
-  refuse_foreign_air(used, solved);
-  return judge_calibration(board, std::move(solved), used, used.port.air, progress);
+  Calibration result = judged(std::move(solved), board, used, progress);
+  if (inside.state != State::good) heed(inside, "check the size of the images", result.verdict);
+  return result;
 }
 
 }  // namespace alidade

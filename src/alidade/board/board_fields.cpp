@@ -35,7 +35,6 @@ constexpr const char* usual_dictionary = "DICT_5X5_100";
 }  // namespace
 
 FieldList fields_of(Board& board, bool is_required) {
-  constexpr double min_m = 5e-4, max_m = 2.0;  // of squares that are printed
   const std::string group = "The board";
   return {{.name = "board",
            .value = pair_code(board.cols, board.rows, 1 << 30, "COLSxROWS, for example 9x6"),
@@ -44,7 +43,7 @@ FieldList fields_of(Board& board, bool is_required) {
            .group = group,
            .is_required = is_required},
           {.name = "square_m",
-           .value = length_code(board.square_m, min_m, max_m),
+           .value = length_code(board.square_m, min_square_m, max_square_m),
            .help = "Side of a square, distance of circles, side of a tag [m], or 25mm",
            .form = "M",
            .group = group,
@@ -55,7 +54,7 @@ FieldList fields_of(Board& board, bool is_required) {
            .old_options = {"--target"},
            .group = group},
           {.name = "marker_m",
-           .value = length_code(board.marker_m, min_m, max_m),
+           .value = length_code(board.marker_m, min_square_m, max_square_m),
            .help = "Side of a marker (charuco), gap between tags (aprilgrid), diameter (circles) [m]",
            .form = "M",
            .group = group},

@@ -5,6 +5,9 @@
 
 namespace alidade {
 
+/// Squares, markers and gaps of boards that are printed. [m]
+inline constexpr double min_square_m = 5e-4, max_square_m = 2.0;
+
 /// The fields of a board, wherever one is given: board (columns x rows), square_m, board_kind, marker_m, dictionary.
 /// Lengths are metres, or have their unit; a bare number that no printed board has is refused, as millimetres were
 /// meant. `is_required`: columns, rows and square must be given; else they may be, both or none.

@@ -40,7 +40,7 @@ struct PortKnowledge {
   double n_glass = 1.5, n_water = 1.34;  ///< Fixed: the photos hardly separate them from the gap.
 };
 
-/// Options of calibrate(). Plain data with usable defaults: `calibrate(board, views, size, {})` is a sensible call.
+/// Options of calibrate(). Plain data with usable defaults: `calibrate(photos, board)` is a sensible call.
 struct CalibrateConfig {
   std::string model = "brown";                ///< pinhole, brown, kannala_brandt or flat_port.
   std::vector<std::string> fixed = {"skew"};  ///< Fixed parameters: at their prior's value, else zero (k…, skew).

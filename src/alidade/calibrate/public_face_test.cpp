@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -93,6 +94,44 @@ TEST(CalibrateFace, AnswersCornersThatCannotBe) {
   EXPECT_NE(fault_with([](Corner& corner) { corner.px.x() = std::nan(""); }), "");
   EXPECT_NE(fault_with([](Corner& corner) { corner.cov(0, 0) = -1.0; }), "");
   EXPECT_NE(fault_with([](Corner& corner) { corner.cov.setZero(); }), "");
+}
+
+TEST(CalibrateFace, AnswersACornerGivenTwiceAndPointsOfNoShape) {
+  auto views = views_of(8);
+  views[3].corners[5].index = views[3].corners[4].index;
+  EXPECT_THROW((void)calibrate(views, sample_size, sample_board), ConfigError);
+  CalibrateConfig config;
+  config.board_points = points_in_board(sample_board);
+  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("BoardShape::given"));
+}
+
+/// Whether the verdict of that calibration has a check of that name that is not good.
+bool is_named(const std::string& name, const std::vector<BoardView>& views, const ImageSize& size, const Board& board) {
+  const Verdict verdict = calibrate(views, size, board).verdict;
+  return verdict.state == State::care && std::ranges::any_of(verdict.checks, [&name](const Check& check) {
+           return check.name == name && check.state == State::care;
+         });
+}
+
+/// Images of another size have corners outside: many are refused, a few are named.
+TEST(CalibrateFace, SaysThatCornersLieOutsideTheImages) {
+  const auto views = views_of(10);
+  double right_px = 0.0;
+  for (const BoardView& view : views)
+    for (const Corner& corner : view.corners) right_px = std::max(right_px, corner.px.x());
+  const int height_px = sample_size.height_px;
+  EXPECT_FALSE(is_named("corners inside", views, sample_size, sample_board));
+  EXPECT_TRUE(is_named("corners inside", views, {static_cast<int>(right_px) - 1, height_px}, sample_board));
+  EXPECT_THROW((void)calibrate(views, {sample_size.width_px / 2, height_px}, sample_board), ConfigError);
+}
+
+/// 25 for 25 mm: the lens is right, the poses are kilometres away.
+TEST(CalibrateFace, NamesSquaresOfAnotherUnit) {
+  for (const double square_m : {25.0, 25e-6, sample_board.square_m}) {
+    Board board = sample_board;
+    board.square_m = square_m;
+    EXPECT_EQ(is_named("square", views_of(10), sample_size, board), square_m != sample_board.square_m) << square_m;
+  }
 }
 
 TEST(CalibrateFace, AnswersEmptyInput) {

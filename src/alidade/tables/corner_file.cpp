@@ -84,22 +84,6 @@ ImageSize min_size(std::span<const BoardView> views) {
   return {to_hold(corner.x()), to_hold(corner.y())};
 }
 
-void require_corners_inside(const ImageSize& size, const std::filesystem::path& file,
-                            std::span<const BoardView> views) {
-  std::size_t outside = 0, all = 0;
-  for (const BoardView& view : views) {
-    for (const Corner& corner : view.corners) {
-      const bool is_inside =
-          corner.px.minCoeff() > -1.0 && corner.px.x() < size.width_px && corner.px.y() < size.height_px;
-      outside += is_inside ? 0 : 1;
-      ++all;
-    }
-  }
-  if (10 * outside <= all) return;
-  throw InputError(fmt::format("{}: {} of {} corners lie outside an image of {}x{} px: check --size", file.string(),
-                               outside, all, size.width_px, size.height_px));
-}
-
 std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board) {
   std::string text =
       "photo,cam_from_board_x_m,cam_from_board_y_m,cam_from_board_z_m,cam_from_board_qw,cam_from_board_qx,"

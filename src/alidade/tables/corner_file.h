@@ -29,10 +29,6 @@ ALIDADE_PUBLIC_BEGIN
 /// The smallest images that hold all corners [px]: where their size is not given.
 [[nodiscard]] ImageSize min_size(std::span<const BoardView> views);
 
-/// A size that does not hold the corners is of other images: throws InputError about `file` where more than one in ten
-/// lies outside. A few outside may be wrong corners.
-void require_corners_inside(const ImageSize& size, const std::filesystem::path& file, std::span<const BoardView> views);
-
 /// Poses as CSV: photo,cam_from_board_x_m,…_y_m,…_z_m,…_qw,…_qx,…_qy,…_qz.
 [[nodiscard]] std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board);
 

@@ -1,6 +1,10 @@
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <string>
+#include <string_view>
 
 #include "alidade/estimation/config_error.h"
 #include "alidade/estimation/progress.h"
@@ -12,9 +16,42 @@
 namespace alidade::python {
 namespace {
 
+bool is_of_option(char letter) { return letter == '-' || std::islower(letter) != 0 || std::isdigit(letter) != 0; }
+
+/// The keyword of an option without its dashes: "sigma-px" is sigma_px.
+std::string keyword_of(std::string option) {
+  std::ranges::replace(option, '-', '_');
+  const bool is_of_board = option == "square" || option == "marker";
+  return is_of_board ? option + "_m" : option;
+}
+
+/// A sentence of the command line with the keywords for its options: "--sigma-px: '-1' is not above 0" begins with
+/// sigma_px, "give --glass 0.01" ends with glass=0.01, "see alidade track --help" is "see help(alidade.track)".
+std::string in_keywords(std::string text) {
+  constexpr std::string_view see = "see alidade ", help = " --help";
+  if (const std::size_t at = text.find(see), end = text.find(help); at != text.npos && end > at && end != text.npos) {
+    std::string command = text.substr(at + see.size(), end - at - see.size());
+    std::ranges::replace(command, ' ', '.');
+    text.replace(at, end + help.size() - at, "see help(alidade." + command + ")");
+  }
+  for (std::size_t at = 0; (at = text.find("--", at)) != text.npos; ++at) {
+    const bool begins = at == 0 || (!is_of_option(text[at - 1]) && text[at - 1] != '/');
+    if (!begins || at + 2 >= text.size() || std::islower(text[at + 2]) == 0) continue;
+    const auto end = static_cast<std::size_t>(
+        std::find_if_not(text.begin() + static_cast<std::ptrdiff_t>(at) + 2, text.end(), is_of_option) - text.begin());
+    const bool has_value = end + 1 < text.size() && text[end] == ' ' &&
+                           (std::isupper(text[end + 1]) != 0 || std::isdigit(text[end + 1]) != 0);
+    if (has_value) text[end] = '=';
+    text.replace(at, end - at, keyword_of(text.substr(at + 2, end - at - 2)));
+  }
+  return text;
+}
+
 /// What is wrong with the input is a ValueError, in the one line that the command prints.
 void translate(std::exception_ptr thrown) {
-  const auto wrong = [](const char* what) { PyErr_SetString(PyExc_ValueError, cli::one_line(what).c_str()); };
+  const auto wrong = [](const char* what) {
+    PyErr_SetString(PyExc_ValueError, in_keywords(cli::one_line(what)).c_str());
+  };
   try {
     if (thrown) std::rethrow_exception(thrown);
   } catch (const cli::UsageError& error) {

@@ -102,6 +102,16 @@ class Hostile(InFolder):
                        (lambda: al.rangefinder(shots, camera=TRUE_CAMERA, board=BOARD),
                         "shots:2: photo 'a.png': a.png: cannot be read: No such file or directory")])
 
+    def test_options_are_named_as_keywords(self):
+        corners, events = board_corners(num_views=4), self.events.tables["events"]
+        self.refusals([(lambda: al.Board("9x6", 0.02, marker_m=0.01), "marker_m: a chessboard has none"),
+                       (lambda: al.Board("9x6", 0.02, board_kind="charuco"), "board_kind charuco needs marker_m=M"),
+                       (lambda: al.calibrate(corners=corners, size=(640, 480), board=BOARD, model="flat_port"),
+                        "model flat_port: give the port's thickness in metres, glass=0.01"),
+                       (lambda: al.track(events), "track: rig is required; see help(alidade.track)"),
+                       (lambda: al.simulate.board(photos=-3), "simulate board: photos: Value -3 not in range 1 to 100000"),
+                       (lambda: al.track(events, rig=self.rig, smooth_s=0.1, method="imm"), "smooth: not for method imm")])
+
     def test_a_target_is_nested_values_or_its_file(self):
         al.simulate.underwater(frames=20, seed=2).save(self.folder / "water")
         file = self.folder / "water" / "target.yaml"

@@ -10,7 +10,9 @@ int main(int argc, char** argv) {
   alidade::RangefinderConfig config;
   config.board = {.cols = 9, .rows = 6, .square_m = 0.04};
   auto table = alidade::read_shots(argv[1]);
-  alidade::add_corners(argv[3], alidade::read_corners(argv[3], alidade::num_points(*config.board)), table.shots);
+  const auto corners = alidade::read_corners(argv[3], alidade::num_points(*config.board));
+  for (const auto& photo : alidade::add_corners(argv[3], corners, table.shots))
+    std::printf("not used: %s: %s\n", photo.file.c_str(), photo.reason.c_str());
   const auto result = alidade::rangefinder(table.shots, alidade::read_camera(argv[2]), config);
   std::puts(result.verdict.sentence.c_str());
   if (!result.verdict.ok()) return 1;

@@ -193,10 +193,10 @@ class Fleet(unittest.TestCase):
         self.assertEqual({camera: state["n"] for camera, state in states.items()}, {"gap": ROWS, "late": ROWS, "waits": 49, "none": 0, "reboot": ROWS - 100})
         self.assertEqual([states[camera].get(count, 0) for camera, count in (("gap", "missing"), ("late", "missing"), ("waits", "missing"), ("reboot", "restarts"))], [1, 9, 0, 1])
         self.assertEqual(states["reboot"]["t"], rows[-1]["t"])
-        for camera, words in (("gap", "1 row never came"), ("late", "9 rows never came"), ("none", "wait for the first"), ("reboot", "its observer began anew")):
+        for camera, words in (("gap", "1 row never came"), ("late", "9 rows never came"), ("none", "wait for the first"), ("reboot", "its observer restarted")):
             self.assertIn(words, states[camera]["verdict"]["sentence"])
         for words in ("cam.gap.obs: one row before row 51 never came", "cam.gap.obs: row 10 came again, or too late", "cam.waits.obs: row 50 has not come", "cam.none.obs: row 1 has not come",
-                      "cam.reboot.obs: the observer began anew: row 1"):
+                      "cam.reboot.obs: the observer restarted: row 1"):
             self.assertIn(words, said)
         taken = ROWS - 1 + ROWS - 9 + 49 + ROWS
         self.assertIn(f"{taken} of {taken + 10 + 11 + 1 + 1} rows of 5 cameras taken in: 21 wait for one before them (", said)

@@ -245,7 +245,7 @@ TEST_F(RigCommand, WrongCornersAreLeftOutAndNamed) {
   simulate({"--wrong-corners", "0.01"});
   const Outcome outcome = calibrate(path("sim/views.csv"));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, ::testing::ContainsRegex("left out: view [0-9]+: corner [0-9]+ is [0-9]+ px from where"));
+  EXPECT_THAT(outcome.out, ::testing::ContainsRegex("rejected: view [0-9]+: corner [0-9]+ is [0-9]+ px from where"));
   EXPECT_THAT(outcome.out, ::testing::HasSubstr("55 of 55 views"));
   expect_near_truth(read_rig(path("out/rig.yaml")), read_rig(path("sim/truth_rig.yaml")), 0.40, 0.007);
 }

@@ -245,7 +245,7 @@ class Worker {
     ready_.clear();
     const auto arrival = held.order.add(*row, place->sequence, ready_);
     if (arrival == FleetRowOrder::Arrival::late)
-      tell_some(num_late_, fmt::format("cam.{}.obs: row {} came again, or too late: it is left out", id, row->n));
+      tell_some(num_late_, fmt::format("cam.{}.obs: row {} came again, or too late: it is rejected", id, row->n));
     if (arrival == FleetRowOrder::Arrival::waits && held.order.num_waiting() == 3) say_waits(id, held);
     for (const FleetRowOrder::Ready& each : ready_) {
       say_order(id, each);
@@ -263,7 +263,7 @@ class Worker {
 
   void say_order(const std::string& id, const FleetRowOrder::Ready& ready) {
     const std::int64_t n = ready.row.n;
-    if (ready.begins_anew) tell_some(num_restarts_, fmt::format("cam.{}.obs: the observer began anew: row {}", id, n));
+    if (ready.begins_anew) tell_some(num_restarts_, fmt::format("cam.{}.obs: the observer restarted: row {}", id, n));
     if (ready.num_missing == 0) return;
     num_missing_ += static_cast<std::size_t>(ready.num_missing);
     tell_some(num_gaps_, fmt::format("cam.{}.obs: {} before row {} never came, and {} given up", id,

@@ -364,7 +364,7 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
 void add_rotation_scenario(App& app) {
   auto args = std::make_shared<SimulateRotationArgs>();
   CLI::App& command = app.add_command(
-      {"simulate rotation", "Pixels of still points and the rotation of a camera that turns, with the truth",
+      {"simulate rotation", "Pixels of static points and the rotation of a camera that rotates, with the truth",
        "  alidade simulate rotation --out turn && alidade observe turn/log.csv --size 780x582\n"
        "  alidade simulate rotation --source head --tilt-deg 20 --zoom ramp --k1 -0.2 --out zoom\n"
        "  alidade simulate rotation --video --source head --duration 8 --out film &&\n"

@@ -63,7 +63,7 @@ void identify_turns(Identification& result) {
   result.encoder_wraps = wraps;
 }
 
-/// Rows that are left out: a few do no harm.
+/// Rows that are rejected: a few do no harm.
 void add_spikes(const std::vector<ServoSample>& log, const std::vector<std::size_t>& rows, Identification& result) {
   constexpr double few = 0.02;
   if (rows.empty()) return;
@@ -72,7 +72,7 @@ void add_spikes(const std::vector<ServoSample>& log, const std::vector<std::size
   result.verdict.checks.push_back({"outliers", num > most ? State::care : State::good,
                                    std::to_string(rows.size()) + " of " + std::to_string(log.size()) +
                                        " angles are far from those before and after them (first at t = " +
-                                       text_of(first.t_s, 4) + " s), where no axis is: left out",
+                                       text_of(first.t_s, 4) + " s), where no axis is: rejected",
                                    num, most, "rows", ""});
   if (num <= most || result.verdict.state != State::good) return;
   result.verdict.state = State::care;

@@ -25,7 +25,7 @@ std::string sentence_of(const FleetNumbers& numbers) {
     if (times > 1) text += fmt::format(" {} times", times);
   };
   if (numbers.num_missing > 0) add(rows_word(numbers.num_missing) + " never came", 1);
-  if (numbers.num_restarts > 0) add("its observer began anew", numbers.num_restarts);
+  if (numbers.num_restarts > 0) add("its observer restarted", numbers.num_restarts);
   if (numbers.num_back > 0)
     add(fmt::format("its clock went back by {}{:.6g} s", numbers.num_back > 1 ? "up to " : "", numbers.most_back_s),
         numbers.num_back);

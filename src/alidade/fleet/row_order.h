@@ -23,7 +23,7 @@ struct FleetNumbers {
 };
 /// Of the next row in order.
 void note_time(const FleetRow& row, FleetNumbers& numbers);
-/// "2 rows never came; its observer began anew; its clock went back by 3600 s"; empty: nothing of that kind.
+/// "2 rows never came; its observer restarted; its clock went back by 3600 s"; empty: nothing of that kind.
 [[nodiscard]] std::string sentence_of(const FleetNumbers& numbers);
 /// As one line, and back; false where it is none.
 [[nodiscard]] std::string numbers_text(const FleetNumbers& numbers);

@@ -73,7 +73,7 @@ TEST(FleetRowOrder, FollowsAnObserverThatBeginsAnew) {
     EXPECT_EQ(rows.ready.size(), 130u);
     EXPECT_TRUE(rows.ready[100].begins_anew);
     EXPECT_FALSE(rows.ready[101].begins_anew);
-    EXPECT_EQ(sentence_of(rows.order.numbers()), "its observer began anew");
+    EXPECT_EQ(sentence_of(rows.order.numbers()), "its observer restarted");
   }
   Ordered gap;
   for (int n = 1; n <= 60; ++n)
@@ -86,7 +86,7 @@ TEST(FleetRowOrder, FollowsAnObserverThatBeginsAnew) {
   for (int n = 1; n <= 100; ++n) (void)later.add(n, n);
   for (int n = 17; n <= 120; ++n) (void)later.add(n, 100 + n);
   EXPECT_EQ(later.order.n(), 120);
-  EXPECT_EQ(sentence_of(later.order.numbers()), "16 rows never came; its observer began anew");
+  EXPECT_EQ(sentence_of(later.order.numbers()), "16 rows never came; its observer restarted");
 }
 
 /// Rows that come again, an hour's clock error, one number far beyond all: nothing begins anew, nothing stays held.

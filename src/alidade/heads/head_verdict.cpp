@@ -103,7 +103,7 @@ void check_rests(const PositionerLog& log, const PositionerFit& fit, const std::
 void check_renewal(const PositionerFit& fit, const std::string& axis, std::vector<Check>& checks) {
   if (fit.renewal_s == 0.0) return;
   checks.push_back({axis + " renewal", State::care,
-                    fmt::format("{} is read anew every {:.2g} s only (a cached status): its acceleration and time "
+                    fmt::format("{} is updated every {:.2g} s only (a cached status): its acceleration and time "
                                 "constant are of readings that are up to so old",
                                 axis, fit.renewal_s),
                     fit.renewal_s, 0.15, "s", ""});

@@ -235,17 +235,17 @@ void add_lines_of_head(const Rig& rig, std::size_t h, std::vector<std::string>& 
 }
 
 std::vector<std::string> lines_of(const RigCalibration& result) {
-  std::vector<std::string> no_boards, not_used, left_out;
+  std::vector<std::string> no_boards, not_used, rejected;
   for (const SkippedInput& photo : result.no_board) no_boards.push_back(photo.file + ": " + photo.reason);
   for (std::size_t v = 0; v < result.views.size() && v < result.measured.size(); ++v) {
     const HeadViewFit& fit = result.views[v];
     if (!fit.used && !fit.reason.empty()) not_used.push_back(result.measured[v].seen.photo + ": " + fit.reason);
   }
-  for (const SkippedInput& corners : result.wrong_corners) left_out.push_back(corners.file + ": " + corners.reason);
+  for (const SkippedInput& corners : result.wrong_corners) rejected.push_back(corners.file + ": " + corners.reason);
   std::vector<std::string> lines;
   add_each("no board", no_boards, lines);
   add_each("not used", not_used, lines);
-  add_each("left out", left_out, lines);
+  add_each("rejected", rejected, lines);
   if (!result.repeated.empty())
     lines.push_back(fmt::format("averaged: {} of {} views show their board where the view before does",
                                 result.repeated.size(), result.counts.given));

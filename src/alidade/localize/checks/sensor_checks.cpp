@@ -52,7 +52,7 @@ void add_corrected(const SensorScale& sensor, Verdict& verdict) {
     verdict.checks.push_back({sensor.sensor + " slip", State::care,
                               "the " + sensor.sensor + " slips: from " + text_of(sensor.slip_from_s) + " to " +
                                   text_of(sensor.slip_to_s) + " s its way is " + text_of(sensor.slip_ratio, 2) +
-                                  " times the path's: left out",
+                                  " times the path's: rejected",
                               sensor.slip_ratio, 1.0, "1", "path"});
   if (!sensor.arm_m.isZero(0.0)) add_arm(sensor, verdict);
   if (sensor.offset_m != 0.0)

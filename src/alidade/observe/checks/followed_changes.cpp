@@ -89,16 +89,17 @@ std::optional<Check> moved_centre(const std::vector<IntrinsicsEstimate>& rows, c
     const double zoomed_px = std::abs(b.fx - a.fx), moved_px = std::hypot(b.cx - a.cx, b.cy - a.cy);
     const double sigma_px = std::sqrt(a.sigma.tail<2>().squaredNorm() + b.sigma.tail<2>().squaredNorm());
     if (moved_px - clearly * sigma_px < most * zoomed_px) continue;
-    return Check{"centre stays",
-                 State::care,
-                 "at " + row_time_text(log.rows[change.before].t_s) + " cx, cy move by " + text_of(moved_px, 2) +
-                     " px while fx changes by " + text_of(zoomed_px, 2) +
-                     " px: no zoom does that; was the camera or its lens bumped, or the head zeroed anew? part the log "
-                     "there, each part has a mounting of its own",
-                 moved_px,
-                 most * zoomed_px,
-                 "px",
-                 "intrinsics"};
+    return Check{
+        "centre stays",
+        State::care,
+        "at " + row_time_text(log.rows[change.before].t_s) + " cx, cy move by " + text_of(moved_px, 2) +
+            " px while fx changes by " + text_of(zoomed_px, 2) +
+            " px: no zoom does that; was the camera or its lens bumped, or the head zeroed again? part the log "
+            "there, each part has a mounting of its own",
+        moved_px,
+        most * zoomed_px,
+        "px",
+        "intrinsics"};
   }
   return std::nullopt;
 }

@@ -269,7 +269,7 @@ Check places_check(const RotationLog& log, const FramePlaces& places) {
     text += (text.empty() ? "" : "; ") + std::to_string(places.repeated.size()) +
             (places.repeated.size() == 1 ? " image is" : " images are") +
             " the one before once more while the camera rotates, first at " +
-            row_time_text(log.rows[places.repeated.front()].t_s) + ": left out";
+            row_time_text(log.rows[places.repeated.front()].t_s) + ": rejected";
   return {"frames", State::care, text,       static_cast<double>(num) + static_cast<double>(places.repeated.size()),
           0.0,      "1",         "residuals"};
 }

@@ -35,7 +35,7 @@ std::string size_of(const CauseScore& cause) {
 }
 
 constexpr const char* step_advice =
-    "was the camera or its lens bumped, or the head zeroed anew? part the log there, each part has a mounting of its "
+    "was the camera or its lens bumped, or the head zeroed again? part the log there, each part has a mounting of its "
     "own";
 
 bool is_zoom(const CauseScore& cause) { return cause.name == "focal length that varies"; }

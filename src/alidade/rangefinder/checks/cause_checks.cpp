@@ -196,7 +196,7 @@ std::string alike(const ShotCause& cause, const std::vector<ShotCause>& causes) 
               : other.name == "incidence" ? "readings that depend on incidence"
                                           : "a sheet before the print";
   }
-  return others.empty() ? "" : "; " + others + " cannot be told apart from it here";
+  return others.empty() ? "" : "; " + others + " cannot be distinguished from it here";
 }
 
 /// What the errors of all shots share.

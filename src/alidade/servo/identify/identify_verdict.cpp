@@ -269,7 +269,7 @@ std::optional<Verdict> mixed_units(std::span<const ServoSample> log) {
 std::optional<Verdict> refusal(std::span<const ServoSample> log, const ServoIdentification& identified) {
   const std::string excite = "log a step or a chirp of the command that moves the axis by degrees";
   if (log.size() < 20)
-    return refused("only " + std::to_string(log.size()) + " rows: too few for five parameters", "log at least 20 rows");
+    return refused("too few rows for five parameters: " + std::to_string(log.size()), "log at least 20 rows");
   if (auto mixed = mixed_units(log)) return mixed;
   if (!(identified.command_range > 0.0))
     return refused("no excitation: the command is " + text_of(log.front().command) + " throughout", excite);

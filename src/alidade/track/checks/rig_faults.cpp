@@ -345,7 +345,7 @@ std::string fault_text(const TrackReport& report) {
   std::size_t num = 0;
   for (std::size_t k = 1; k < report.faults.size(); ++k) {
     if (!is_alike(first, report.faults[k]) || ++num > max_named) continue;
-    text += (num == 1 ? ", which cannot be told apart from " : ", ") + report.faults[k].name;
+    text += (num == 1 ? ", which cannot be distinguished from " : ", ") + report.faults[k].name;
   }
   if (num > max_named) text += " and " + std::to_string(num - max_named) + " more";
   return text;

@@ -185,9 +185,9 @@ TEST_F(CalibrateSurvives, ASizeThatIsNotTheImagesIsNamed) {
   EXPECT_FALSE(fs::exists(out()));
   ASSERT_EQ(calibrate({photos().string()}).code, 0);
   const Outcome outcome = calibrate({"--corners", (out() / "corners.csv").string(), "--size", "100x100"});
-  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.code, 2);
   expect_one_line(outcome);
-  EXPECT_THAT(outcome.err, HasSubstr("check --size"));
+  EXPECT_THAT(outcome.err, HasSubstr("check the size"));
 }
 
 TEST_F(CalibrateSurvives, APhotoOfAnotherSizeIsRefusedByName) {

@@ -29,6 +29,7 @@ struct BeamNow {
   double sigma_corner_px = 0.2;
   bool estimate_scale = false;
   std::vector<TakenShot> taken = {};  ///< For what they say of distortion that was held. May be empty.
+  CountedSheet sheet = {};            ///< Of what `beam.cov` has of it, and what shots leave open of it.
 };
 
 struct ShotLimits {

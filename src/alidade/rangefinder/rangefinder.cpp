@@ -205,9 +205,9 @@ void carry_scale(RangefinderReport& report) {
   if (z > hardly && z < proved) variance += away * away;
 }
 
-/// What was told of the surface that the beam meets, as far as the shots leave it open.
-void carry_told_sheet(RangefinderReport& report) {
-  for (const ShotCause& cause : report.causes) report.beam.cov += cause.left_open * cause.left_open.transpose();
+void carry_sheet(RangefinderReport& report) {
+  report.sheet.share = counted_share(report.sheet, report.beam.cov);
+  report.beam.cov += report.sheet.counted();
 }
 
 CommonState start_state(const BeamProblem& problem, const Camera& camera, const Beam& beam) {
@@ -292,14 +292,15 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
   if (!part.inverse.allFinite()) return;
   put_clusters(problem, system, part, prior, report);
   report.fixed = fixed_quantities(system, part, prior, camera, problem.points_in_board, report, config);
-  report.causes = error_causes(problem, system, part, prior, report, config);
+  report.causes = error_causes(problem, system, part, prior, report);
+  report.sheet = open_sheet(problem, system, part, report, config);
   for (FixedQuantity& sigma : fixed_sigmas(problem, report)) report.fixed.push_back(std::move(sigma));
   if (config.refine == Refine::beam) carry_lens(problem, camera, report);
   carry_given(report);
   if (config.refine == Refine::all) carry_surprise(report);
   carry_asked(report);
   carry_scale(report);
-  carry_told_sheet(report);
+  carry_sheet(report);
 }
 
 void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, const RangefinderConfig& config,

@@ -2,7 +2,6 @@
 
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "alidade/estimation/progress.h"
@@ -29,9 +28,9 @@ namespace alidade {
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
 
 /// The same of a lens' distortion that its file gives without σ: then it is better estimated, where boards determine
-/// it. `kind`: "k", radial; "p", tangential; empty: either.
+/// it.
 [[nodiscard]] bool wants_distortion(const RangefinderReport& report, const Camera& camera,
-                                    const RangefinderConfig& config, std::string_view kind = "");
+                                    const RangefinderConfig& config);
 
 /// Why shots that no beam explains may do so: with the ranges in another unit, each range a row before or after its
 /// spot and board, or spots with u and v exchanged or mirrored, a beam explains them well. One sentence; empty where

@@ -49,13 +49,24 @@ struct ShotCause {
   std::string unit;
   double sigmas = 0.0;                    ///< By how many σ the residuals indicate it; 0 with too few shots.
   BeamVector moves = BeamVector::Zero();  ///< Of the beam, were it of that size.
-  /// Of the beam, by σ of what the shots leave open of it, where a σ of it was told.
-  BeamVector left_open = BeamVector::Zero();
+};
+
+/// A sheet before the print, whose surface the beam meets instead: what of it the shots leave open, and what of that
+/// the beam's covariance counts. One that was told is counted as it is, one that was not so far that it moves no
+/// parameter of the beam by more than σ.
+struct CountedSheet {
+  double sigma_m = 0.0;  ///< Of its thickness, told or ordinary; 0: none is counted.
+  bool is_told = false;
+  double left_m = 0.0;                    ///< Of the thickness, with what the shots say of it.
+  BeamVector moves = BeamVector::Zero();  ///< Of the beam, by left_m.
+  double share = 0.0;                     ///< Of these moves in Beam::cov.
+
+  [[nodiscard]] BeamMatrix counted() const { return share * share * moves * moves.transpose(); }
 };
 
 /// Distortion that the camera file gave without σ, and that was estimated from the shots.
 struct FreedDistortion {
-  std::string name;  ///< k1, k2
+  std::string name;  ///< k1, k2, p1, p2
   double was = 0.0, value = 0.0, sigma = 0.0;
 };
 
@@ -98,6 +109,7 @@ struct RangefinderReport {
   ClusterCovariance clusters;                 ///< What separates the two; shots are its clusters.
   std::vector<FixedQuantity> fixed;
   std::vector<ShotCause> causes;
+  CountedSheet sheet;
   std::vector<FreedDistortion> freed_distortion;  ///< Empty: the file's holds.
   std::vector<OverruledSigma> overruled_sigmas;
   bool scale_by_need = false;      ///< The scale was estimated as a nuisance parameter, not as a result.

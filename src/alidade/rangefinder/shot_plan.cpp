@@ -112,6 +112,7 @@ BeamNow beam_now(const RangefinderReport& report, const RangefinderConfig& confi
   now.method = config.method;
   now.refine = config.refine;
   now.estimate_scale = config.estimate_scale;
+  now.sheet = report.sheet;
   if (report.sigma_spot_px > 0.0) now.sigma_spot_px = report.sigma_spot_px;
   if (report.sigma_corner_px > 0.0) now.sigma_corner_px = report.sigma_corner_px;
   put_taken(report, config.board.has_value(), now);

@@ -117,6 +117,9 @@ TEST(Plans, ARangefinderIsReadAsItWasWritten) {
       EXPECT_EQ(read.sees_spots, num_spots > 0);
       EXPECT_TRUE(read.sees_boards);
       ASSERT_EQ(read.taken.size(), now.taken.size());
+      EXPECT_DOUBLE_EQ(read.sheet.left_m, now.sheet.left_m);
+      EXPECT_DOUBLE_EQ(read.sheet.share, now.sheet.share);
+      EXPECT_LT((read.sheet.moves - now.sheet.moves).norm(), 1e-12);
       const ShotPlan a = plan_shots(now), b = plan_shots(read);
       ASSERT_EQ(a.shots.size(), b.shots.size());
       EXPECT_NEAR(a.shots.back().sigma_origin_m / b.shots.back().sigma_origin_m, 1.0, 0.01);

@@ -222,6 +222,16 @@ void fill_beam(const RangefinderCalibration& report, ResultDocument& document) {
     for (Eigen::Index j = i; j < 7; ++j) document.covariance_upper.push_back(report.covariance(i, j));
 }
 
+/// What the next shots are planned with: of a sheet that may lie before the print, what the shots leave open.
+void put_sheet(const CountedSheet& sheet, JsonValue& estimate) {
+  if (!(sheet.left_m > 0.0)) return;
+  estimate["sheet"]["sigma_m"] = sheet.sigma_m;
+  estimate["sheet"]["from"] = sheet.is_told ? "given" : "ordinary";
+  estimate["sheet"]["left_m"] = sheet.left_m;
+  estimate["sheet"]["moves"] = Numbers(sheet.moves.begin(), sheet.moves.end());
+  estimate["sheet"]["share"] = sheet.share;
+}
+
 void fill_geometry_and_noise(const RangefinderCalibration& result, JsonValue& estimate) {
   const BeamBound& bound = result.bound;
   estimate["spot_sigma_px"] = Numbers(bound.spot_sigma_px.begin(), bound.spot_sigma_px.end());
@@ -231,6 +241,7 @@ void fill_geometry_and_noise(const RangefinderCalibration& result, JsonValue& es
   estimate["normal_spread"] = bound.normal_spread;
   estimate["offset_m"] = bound.offset_m;
   if (result.status == RangefinderReport::Status::converged) estimate["sigma"] = sigma_of_shots(result);
+  put_sheet(result.sheet, estimate);
   estimate["noise"]["sigma_spot_px"] = result.sigma_spot_px;
   estimate["noise"]["sigma_corner_px"] = result.sigma_corner_px;
   estimate["noise"]["sigma_range_m"] = result.beam.noise.sigma_m;

@@ -58,6 +58,18 @@ void put_taken_shots(const Json& data, bool have_corners, BeamNow& now) {
   now.sees_boards = boards || !any || (now.method == RangefinderMethod::spot && have_corners);
 }
 
+CountedSheet sheet_in(const Json& estimate) {
+  CountedSheet sheet;
+  if (!estimate.contains("sheet")) return sheet;
+  const Json& json = estimate.at("sheet");
+  sheet.sigma_m = json.at("sigma_m").get<double>();
+  sheet.is_told = json.at("from") == "given";
+  sheet.left_m = json.at("left_m").get<double>();
+  sheet.share = json.at("share").get<double>();
+  for (int i = 0; i < num_beam_params; ++i) sheet.moves[i] = json.at("moves").at(static_cast<std::size_t>(i));
+  return sheet;
+}
+
 }  // namespace
 
 BeamNow read_rangefinder(const std::filesystem::path& result) {
@@ -75,6 +87,7 @@ BeamNow read_rangefinder(const std::filesystem::path& result) {
     now.sigma_spot_px = std::max(0.02, estimate.at("noise").at("sigma_spot_px").get<double>());
     now.sigma_corner_px = std::max(0.01, estimate.at("noise").at("sigma_corner_px").get<double>());
     now.estimate_scale = json.at("stddev").at("scale").get<double>() > 0.0;
+    now.sheet = sheet_in(estimate);
     Board board{.cols = 9, .rows = 6, .square_m = 0.04};
     if (estimate.contains("board")) board = result_board(estimate.at("board").dump());
     now.points_in_board = points_in_board(board);

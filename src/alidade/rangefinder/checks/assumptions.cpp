@@ -15,7 +15,7 @@ double ordinary_error(const FixedQuantity& thing) {
   if (thing.name == "camera.f") return 0.003 * thing.value;
   if (thing.name.starts_with("camera.c")) return 2.0;
   if (thing.name.starts_with("camera.k")) return 0.01;
-  if (thing.name.starts_with("camera.p")) return 0.0001;
+  if (thing.name.starts_with("camera.p")) return 0.0003;
   if (thing.name == "board.flat_m") return 0.0003;
   return 0.2 * thing.value;  // a σ
 }
@@ -43,10 +43,10 @@ void put_move_of(const std::string& name, const Eigen::Ref<const Eigen::VectorXd
 }
 
 /// Which of origin, direction and scale it moves most for an error of the thing.
-void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumption& assumption) {
+void put_moves(const RangefinderReport& report, const BeamMatrix& cov, const BeamVector& moves,
+               Assumption& assumption) {
   const Beam moved = report.beam.retract(1e-6 * moves);  // the step of a sphere, straightened
   const Eigen::Vector3d turned = 1e6 * (moved.direction_in_cam - report.beam.direction_in_cam);
-  const BeamMatrix& cov = report.beam.cov;
   put_move_of("origin_m", moves.head<3>(), std::sqrt(cov.topLeftCorner<3, 3>().trace()), assumption);
   put_move_of("direction", turned, std::sqrt(cov.block<2, 2>(beam_direction_param, beam_direction_param).trace()),
               assumption);
@@ -60,19 +60,26 @@ bool is_of_distortion(const FixedQuantity& thing) {
 
 bool is_of_lengths(const FixedQuantity& thing) { return thing.name == "scale" || thing.name == "square_m"; }
 
-Assumption assumption_of(const RangefinderReport& report, const FixedQuantity& thing) {
+/// `cov`: of the beam, against which it counts.
+Assumption assumption_of(const RangefinderReport& report, const BeamMatrix& cov, const FixedQuantity& thing) {
   Assumption assumption{.name = thing.name, .value = thing.value, .sigma = thing.sigma};
   if (!thing.sigma) assumption.ordinary = ordinary_error(thing);
   assumption.remedy = thing.sigma ? "" : remedy_of(report, thing.name);
-  put_moves(report, thing.sigma.value_or(assumption.ordinary) * thing.moves, assumption);
+  put_moves(report, cov, thing.sigma.value_or(assumption.ordinary) * thing.moves, assumption);
   return assumption;
+}
+
+/// By how much an ordinary error of it moves the beam, in σ that the shots make: one that a sheet makes larger hides
+/// nothing.
+double moves_shots(const RangefinderReport& report, const FixedQuantity& thing) {
+  return assumption_of(report, report.beam.cov - report.sheet.counted(), thing).moves;
 }
 
 }  // namespace
 
 std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report) {
   std::vector<Assumption> assumed;
-  for (const FixedQuantity& thing : report.fixed) assumed.push_back(assumption_of(report, thing));
+  for (const FixedQuantity& thing : report.fixed) assumed.push_back(assumption_of(report, report.beam.cov, thing));
   // With another order, or in a mirrored image, another beam fits spots as well; boards have a left and a right.
   const bool has_boards = std::ranges::any_of(report.shots, [](const ShotFit& fit) { return fit.plane || fit.pose; });
   if (!has_boards && !report.shots.empty())
@@ -81,16 +88,14 @@ std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report)
   return assumed;
 }
 
-bool wants_distortion(const RangefinderReport& report, const Camera& camera, const RangefinderConfig& config,
-                      std::string_view kind) {
+bool wants_distortion(const RangefinderReport& report, const Camera& camera, const RangefinderConfig& config) {
   constexpr double asks_beyond = 3.0;
   if (config.refine != Refine::all || !config.refine_distortion || lens_prior(camera, true).free.empty()) return false;
   const bool has_boards =
       std::any_of(report.shots.begin(), report.shots.end(), [](const ShotFit& fit) { return fit.pose.has_value(); });
   return has_boards && std::any_of(report.fixed.begin(), report.fixed.end(), [&](const FixedQuantity& thing) {
-           if (!is_of_distortion(thing) || thing.sigma || !thing.name.substr(sizeof "camera." - 1).starts_with(kind))
-             return false;
-           return std::abs(thing.asked) > asks_beyond * thing.asked_sigma || assumption_of(report, thing).moves > 1.0;
+           if (!is_of_distortion(thing) || thing.sigma) return false;
+           return std::abs(thing.asked) > asks_beyond * thing.asked_sigma || moves_shots(report, thing) > 1.0;
          });
 }
 
@@ -99,7 +104,7 @@ bool wants_scale(const RangefinderReport& report, const RangefinderConfig& confi
   if (config.estimate_scale || config.sigma_scale || config.method == RangefinderMethod::spot) return false;
   if (std::abs(report.scale_in_sigmas) > asks_beyond) return true;
   return std::any_of(report.fixed.begin(), report.fixed.end(), [&](const FixedQuantity& thing) {
-    return is_of_lengths(thing) && !thing.sigma && assumption_of(report, thing).moves > 1.0;
+    return is_of_lengths(thing) && !thing.sigma && moves_shots(report, thing) > 1.0;
   });
 }
 

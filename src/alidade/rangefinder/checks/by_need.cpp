@@ -30,18 +30,18 @@ struct Shots {
 };
 
 /// Distortion that the file gives without σ.
-std::vector<int> opened_by_need(const Camera& file, std::string_view kind) {
-  std::vector<int> opened = fixed_distortion(file, {}, kind);
+std::vector<int> opened_by_need(const Camera& file) {
+  std::vector<int> opened = fixed_distortion(file, {});
   std::erase_if(opened, [&](int k) { return k < file.cov.rows() && file.cov(k, k) > 0.0; });
   return opened;
 }
 
 /// `file`: as given.
-void name_freed(const Camera& file, std::string_view kind, const Shots& shots, SolvedRangefinder& solved) {
+void name_freed(const Camera& file, const Shots& shots, SolvedRangefinder& solved) {
   const Eigen::VectorXd was = params(file.lens), is = params(solved.report.camera.lens);
   const std::vector<std::string> names = param_names(file.lens);
   solved.report.freed_distortion.clear();
-  for (const int k : opened_by_need(file, kind))
+  for (const int k : opened_by_need(file))
     solved.report.freed_distortion.push_back(
         {names[static_cast<std::size_t>(k)], was[k], is[k], std::sqrt(solved.report.camera.cov(k, k))});
   solved.verdict = rangefinder_verdict(solved.report, shots.shots, solved.config);
@@ -50,10 +50,10 @@ void name_freed(const Camera& file, std::string_view kind, const Shots& shots, S
 /// Twice: the corners of each board are weighed by how the lens that the solve starts with fits them. None where the
 /// shots do not determine it.
 std::optional<SolvedRangefinder> with_free_distortion(const Shots& shots, const Camera& camera,
-                                                      const RangefinderConfig& config, std::string_view kind) {
+                                                      const RangefinderConfig& config) {
   const Camera file = with_distortion(camera);
-  const std::vector<int> opened = opened_by_need(file, kind);
-  Camera open = with_open_distortion(camera, kind);
+  const std::vector<int> opened = opened_by_need(file);
+  Camera open = with_open_distortion(camera);
   if (opened.empty() || config.refine != Refine::all || open.cov.rows() != params(open.lens).size())
     return std::nullopt;
   std::optional<SolvedRangefinder> solved;
@@ -64,7 +64,7 @@ std::optional<SolvedRangefinder> with_free_distortion(const Shots& shots, const 
     values(opened) = params(solved->report.camera.lens)(opened);
     open.lens = with_params(open.lens, values);
   }
-  name_freed(file, kind, shots, *solved);
+  name_freed(file, shots, *solved);
   return solved;
 }
 
@@ -142,6 +142,7 @@ SolvedRangefinder solve_rangefinder(std::span<const Shot> given, std::span<const
                                     const Camera& camera, const RangefinderConfig& told, const Progress& progress) {
   const Shots shots{given, points_in_board, progress};
   RangefinderConfig config = told;
+  config.untold_sheet_m = ordinary_sheet_m;
   SolvedRangefinder best = shots.solved_with(camera, config);
   if (config.sigma_range_m || config.sigma_spot_px)
     if (auto found = with_found_sigmas(shots, camera, config, best.verdict.state == State::good ? 3.0 : 1.0)) {
@@ -150,11 +151,8 @@ SolvedRangefinder solve_rangefinder(std::span<const Shot> given, std::span<const
     }
   const std::vector<OverruledSigma> overruled = best.report.overruled_sigmas;
   const bool is_solved = best.verdict.exit_code == ExitCode::ok, has_boards = shots.have_boards();
-  const bool wants_radial = !is_solved || wants_distortion(best.report, camera, config, "k");
-  const bool wants_tangential = !is_solved || wants_distortion(best.report, camera, config, "p");
-  const std::string_view kind = !wants_tangential ? "k" : wants_radial ? "" : "p";
-  if (has_boards && (wants_radial || wants_tangential))
-    if (auto free = with_free_distortion(shots, camera, config, kind)) {
+  if (has_boards && (!is_solved || wants_distortion(best.report, camera, config)))
+    if (auto free = with_free_distortion(shots, camera, config)) {
       best = std::move(*free);
       name_overruled(overruled, shots, best);
     }
@@ -170,7 +168,7 @@ SolvedRangefinder solve_rangefinder(std::span<const Shot> given, std::span<const
   RangefinderConfig with_scale = config;
   with_scale.estimate_scale = with_scale.scale_by_need = true;
   SolvedRangefinder free = shots.solved_with(best.camera, with_scale);
-  if (!best.report.freed_distortion.empty()) name_freed(with_distortion(camera), kind, shots, free);
+  if (!best.report.freed_distortion.empty()) name_freed(with_distortion(camera), shots, free);
   name_overruled(overruled, shots, free);
   // Readings in another unit have a scale, but that is no answer.
   const bool is_given = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);

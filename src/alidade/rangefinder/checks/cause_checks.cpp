@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "alidade/geometry/decompositions.h"
@@ -112,6 +113,14 @@ void add_bent_board(const RangefinderReport& report, Verdict& verdict) {
                                     found->sigmas, 3.5, "σ", "residuals"));
 }
 
+/// Terms of higher order look like k1 and k2.
+std::string or_k3(const Camera& camera) {
+  const std::vector<std::string> names = param_names(camera.lens);
+  const auto at = std::ranges::find(names, "k3") - names.begin();
+  const bool has_k3 = at < std::ssize(names) && params(camera.lens)[at] != 0.0;
+  return has_k3 ? "" : ", or a k3, which the file does not have";
+}
+
 /// Do boards and spots ask for another lens than the file's?
 void add_camera(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.5, foreign = 0.02;
@@ -128,6 +137,7 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
     check.state = State::care;
     const bool is_focal = thing.name == "camera.f";
     check.text = "the shots indicate " + asked_of_lens(thing) + " (" + text_of(z, 2) + "σ)";
+    if (thing.name.starts_with("camera.k")) check.text += or_k3(report.camera);
     if (is_bent)
       check.text += ", which the bend of the board explains";
     else if (is_focal && std::abs(thing.asked) > foreign * thing.value)
@@ -211,6 +221,10 @@ void add_shared_errors(const RangefinderReport& report, Verdict& verdict) {
                            ask_beyond, "σ", "residuals");
     if (cause.sigmas >= ask_beyond && is_alike(cause) && cause.sigmas < most) {
       check.text = "another cause explains more than " + cause.name + " (" + text_of(cause.sigmas, 2) + "σ) would";
+    } else if (cause.sigmas < ask_beyond && cause.name == "sheet" && report.sheet.share > 0.0) {
+      check.text = "no sheet before the print is indicated; " + text_of(1e3 * report.sheet.left_m, 2) +
+                   " mm of one, which the shots leave open, are counted in σ" +
+                   (report.sheet.is_told ? "" : ": --sigma-flat 0 where the beam meets the print");
     } else if (cause.sigmas >= ask_beyond) {
       check.state = State::care;
       check.text = said_of(cause) + (is_alike(cause) ? alike(cause, report.causes) : "");

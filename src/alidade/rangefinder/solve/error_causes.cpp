@@ -59,7 +59,12 @@ struct TestedCause {
   std::string name, unit;
   Index num = 1;               ///< Of its parameters.
   double num_estimated = 0.0;  ///< Residuals from which the σ was estimated; 0: it was given.
-  double told = 0.0;           ///< σ of its size; 0: none is told.
+};
+
+/// What the errors of all shots say of a cause's size with the beam solved again.
+struct CauseScore {
+  VectorXd s, alone;    ///< ∂cost/2, and the information were the beam known.
+  MatrixXd I, by_beam;  ///< Information; the beam's step for a unit of the cause.
 };
 
 /// A step of the solve as one of the beam.
@@ -72,10 +77,8 @@ BeamVector beam_part(const SolvedPart& part, const VectorXd& step) {
 }
 
 template <typename ShareOf>
-std::optional<ShotCause> tested(const TestedCause& candidate, const ReducedSystem& system, const SolvedPart& part,
-                                const VectorXd& g, const ShareOf& share_of,
-                                ErrorScore ReducedShot::*score = &ReducedShot::errors) {
-  const Index num = candidate.num;
+CauseScore score_of(Index num, const ReducedSystem& system, const SolvedPart& part, const VectorXd& g,
+                    const ShareOf& share_of, ErrorScore ReducedShot::*score = &ReducedShot::errors) {
   VectorXd s = VectorXd::Zero(num);
   MatrixXd I = MatrixXd::Zero(num, num), across = MatrixXd::Zero(num, static_cast<Index>(part.places.size()));
   for (const ReducedShot& shot : system.shots) {
@@ -86,23 +89,19 @@ std::optional<ShotCause> tested(const TestedCause& candidate, const ReducedSyste
     I += share.transpose() * of_shot.I * share;
     across += share.transpose() * of_shot.by_common(Eigen::all, part.places);
   }
-  const VectorXd alone = I.diagonal();
-  s -= across * part.inverse * g;
-  I -= across * part.inverse * across.transpose();
-  ShotCause cause{.name = candidate.name, .unit = candidate.unit};
-  if (candidate.told > 0.0 && s.allFinite()) {
-    const double left = 1.0 / std::sqrt(std::pow(candidate.told, -2) + std::max(0.0, I(0, 0)));
-    cause.left_open = beam_part(part, -part.inverse * across.row(0).transpose() * left);
-  }
+  CauseScore found{s - across * part.inverse * g, I.diagonal(), {}, -part.inverse * across.transpose()};
+  found.I = I + across * found.by_beam;
+  return found;
+}
+
+std::optional<ShotCause> tested(const TestedCause& candidate, const CauseScore& score, const SolvedPart& part) {
   // What the beam takes up but for a thousandth is not determined.
-  if (!(I.diagonal().array() > 1e-3 * alone.array()).all() || !s.allFinite())
-    return candidate.told > 0.0 ? std::optional(cause) : std::nullopt;
-  const VectorXd size = -Ldlt(I).solve(s);
-  const double chi2 = -size.dot(s);
-  cause.size = size.norm();
-  cause.sigmas = score_sigmas(chi2, static_cast<double>(num), candidate.num_estimated);
-  cause.moves = beam_part(part, -part.inverse * across.transpose() * size);
-  return cause;
+  if (!(score.I.diagonal().array() > 1e-3 * score.alone.array()).all() || !score.s.allFinite()) return std::nullopt;
+  const VectorXd size = -Ldlt(score.I).solve(score.s);
+  const double chi2 = -size.dot(score.s);
+  return ShotCause{candidate.name, size.norm(), candidate.unit,
+                   score_sigmas(chi2, static_cast<double>(candidate.num), candidate.num_estimated),
+                   beam_part(part, score.by_beam * size)};
 }
 
 /// Of each shot that was used, what of its three errors a cause is.
@@ -121,15 +120,10 @@ ShotShares shares_of(const BeamProblem& problem, const RangefinderReport& report
     const PreparedShot& shot = problem.shots[i];
     shares.over_rows[i] = static_cast<double>(shot.index) / last - 0.5;
     if (half_m > 0.0) shares.over_range[i] = std::pow((shot.range_m - middle_m) / half_m, 2);
-    const auto residual = shot.used && shot.plane ? shot_residual(shot, report.beam, report.camera, problem.model)
-                                                  : std::optional<ShotResidual>{};
-    if (!residual) continue;
+    if (!shot.used || !shot.plane) continue;
     const double cosine = std::abs(shot.plane->normal_in_cam.dot(report.beam.direction_in_cam));
     shares.tangent[i] = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
-    // A surface that lies before the plane by a metre: one whose d is so much larger.
-    const auto by_d = residual->J_plane.col(3);
-    shares.sheet[i][0] = -by_d[0];
-    if (shot.spot_px) shares.sheet[i].tail<2>() = -by_d.tail<2>();
+    shares.sheet[i] = sheet_share(shot, report.beam, report.camera, problem.model);
   }
   return shares;
 }
@@ -147,10 +141,48 @@ Estimated estimated_by(const BeamProblem& problem, const Measured& measured, con
 
 }  // namespace
 
+Eigen::Vector3d sheet_share(const PreparedShot& shot, const Beam& beam, const Camera& camera, const ShotModel& model) {
+  Eigen::Vector3d share = Eigen::Vector3d::Zero();
+  const auto residual =
+      shot.used && shot.plane ? shot_residual(shot, beam, camera, model) : std::optional<ShotResidual>{};
+  if (!residual) return share;
+  // A surface that lies before the plane by a metre: one whose d is so much larger.
+  const auto by_d = residual->J_plane.col(3);
+  share[0] = -by_d[0];
+  if (shot.spot_px) share.tail<2>() = -by_d.tail<2>();
+  return share;
+}
+
+CountedSheet open_sheet(const BeamProblem& problem, const ReducedSystem& system, const SolvedPart& part,
+                        const RangefinderReport& report, const RangefinderConfig& config) {
+  CountedSheet sheet{.sigma_m = config.sigma_flat_m.value_or(config.untold_sheet_m),
+                     .is_told = config.sigma_flat_m.has_value()};
+  if (!(sheet.sigma_m > 0.0) || !std::ranges::any_of(system.shots, &ReducedShot::has_corners)) return {};
+  const ShotShares shares = shares_of(problem, report);
+  const auto num = static_cast<Index>(part.places.size());
+  const CauseScore score =
+      score_of(1, system, part, VectorXd::Zero(num), [&](std::size_t i) { return Share(shares.sheet[i]); });
+  sheet.left_m = left_of(sheet.sigma_m, score.I(0, 0));
+  sheet.moves = beam_part(part, score.by_beam.col(0) * sheet.left_m);
+  return sheet.moves.allFinite() && !sheet.moves.isZero(0.0) ? sheet : CountedSheet{};
+}
+
+double left_of(double sigma_m, double information) {
+  return 1.0 / std::sqrt(std::pow(sigma_m, -2) + std::max(0.0, information));
+}
+
+double counted_share(const CountedSheet& sheet, const BeamMatrix& cov) {
+  if (sheet.is_told) return 1.0;
+  double most2 = 0.0;  // of the moves in σ
+  for (Index i = 0; i < num_beam_params; ++i)
+    if (cov(i, i) > 0.0) most2 = std::max(most2, sheet.moves[i] * sheet.moves[i] / cov(i, i));
+  return most2 > 1.0 ? std::sqrt(1.0 - 1.0 / most2) : 0.0;
+}
+
 std::vector<ShotCause> error_causes(const BeamProblem& problem, const ReducedSystem& system, const SolvedPart& part,
-                                    const LensPrior& prior, const RangefinderReport& report,
-                                    const RangefinderConfig& config) {
+                                    const LensPrior& prior, const RangefinderReport& report) {
   constexpr std::size_t enough = 7;  // shots
+  if (system.shots.size() < enough) return {};
   const Measured measured = measured_by(problem);
   const auto [of_ranges, of_spots] = estimated_by(problem, measured, report);
   const VectorXd g = gradient_of(system, prior, report.camera)(part.places);
@@ -158,7 +190,8 @@ std::vector<ShotCause> error_causes(const BeamProblem& problem, const ReducedSys
   const bool has_corners = std::ranges::any_of(system.shots, &ReducedShot::has_corners);
   std::vector<ShotCause> causes;
   const auto add = [&](const TestedCause& candidate, const auto& share_of, auto score) {
-    if (auto cause = tested(candidate, system, part, g, share_of, score)) causes.push_back(std::move(*cause));
+    if (auto cause = tested(candidate, score_of(candidate.num, system, part, g, share_of, score), part))
+      causes.push_back(std::move(*cause));
   };
   const auto of_errors = &ReducedShot::errors;
   const auto of_reading = [](double share) { return Share(share * Eigen::Vector3d::UnitX()); };
@@ -170,8 +203,7 @@ std::vector<ShotCause> error_causes(const BeamProblem& problem, const ReducedSys
       {"incidence", "m", 1, of_ranges}, [&](std::size_t i) { return of_reading(shares.tangent[i]); }, of_errors);
   if (has_corners)
     add(
-        {"sheet", "m", 1, of_ranges, config.sigma_flat_m.value_or(0.0)},
-        [&](std::size_t i) { return Share(shares.sheet[i]); }, of_errors);
+        {"sheet", "m", 1, of_ranges}, [&](std::size_t i) { return Share(shares.sheet[i]); }, of_errors);
   if (has_corners)
     add(
         {"bent", "m", 3, rows_of_corners(problem)}, [](std::size_t) { return Share(Eigen::Matrix3d::Identity()); },
@@ -181,9 +213,6 @@ std::vector<ShotCause> error_causes(const BeamProblem& problem, const ReducedSys
         {"wander", "px", 2, of_spots},
         [&](std::size_t i) { return Share(shares.over_rows[i] * Eigen::Matrix3d::Identity().rightCols<2>()); },
         of_errors);
-  if (system.shots.size() >= enough) return causes;
-  std::erase_if(causes, [](const ShotCause& cause) { return cause.left_open.isZero(0.0); });
-  for (ShotCause& cause : causes) cause = {.name = cause.name, .unit = cause.unit, .left_open = cause.left_open};
   return causes;
 }
 

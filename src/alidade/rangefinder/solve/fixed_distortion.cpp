@@ -21,11 +21,10 @@ bool has_sigma(const Camera& camera, int parameter) {
 
 }  // namespace
 
-std::vector<int> fixed_distortion(const Camera& camera, const std::vector<int>& free, std::string_view kind) {
+std::vector<int> fixed_distortion(const Camera& camera, const std::vector<int>& free) {
   const std::vector<std::string> names = param_names(camera.lens);
   std::vector<int> held;
   for (const Distortion& one : distortions) {
-    if (!one.name.starts_with(kind)) continue;
     const auto at = static_cast<int>(std::ranges::find(names, one.name) - names.begin());
     const bool is_there = at < static_cast<int>(names.size());
     if (is_there && std::ranges::find(free, at) == free.end()) held.push_back(at);
@@ -33,11 +32,11 @@ std::vector<int> fixed_distortion(const Camera& camera, const std::vector<int>& 
   return held;
 }
 
-Camera with_open_distortion(const Camera& camera, std::string_view kind) {
+Camera with_open_distortion(const Camera& camera) {
   Camera open = with_distortion(camera);
   if (open.cov.rows() != params(open.lens).size()) return open;  // nothing of it is known
   const std::vector<std::string> names = param_names(open.lens);
-  for (const int parameter : fixed_distortion(open, {}, kind)) {
+  for (const int parameter : fixed_distortion(open, {})) {
     if (has_sigma(open, parameter)) continue;
     const auto one = std::ranges::find(distortions, names[static_cast<std::size_t>(parameter)], &Distortion::name);
     open.cov(parameter, parameter) = one->wide * one->wide;

@@ -1,10 +1,12 @@
 #include "alidade/rangefinder/solve/foreseen_beam.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/rangefinder/rangefinder.h"
 #include "alidade/rangefinder/solve/beam_bound.h"
+#include "alidade/rangefinder/solve/error_causes.h"
 #include "alidade/rangefinder/solve/fixed_distortion.h"
 
 namespace alidade {
@@ -42,11 +44,12 @@ ForeseenBeam::ForeseenBeam(const BeamNow& now) : now_(now), camera_(with_distort
   prior_ = lens_prior(camera_, true);
   num_ = problem_.num_free() + static_cast<Index>(prior_.free.size());
   information_ = known();
-  if (now.refine == Refine::all && !prior_.free.empty()) held_ = fixed_distortion(camera_, prior_.free, "k");
+  if (now.refine == Refine::all && !prior_.free.empty()) held_ = fixed_distortion(camera_, prior_.free);
   prior_.free.insert(prior_.free.end(), held_.begin(), held_.end());
   const auto num_lens = static_cast<Index>(prior_.free.size());
   prior_.information.setZero(num_lens, num_lens);  // it is in what is known; a shot must not bring it again
   count_taken_shots();
+  put_sheet();
   frees_distortion_ = wants_free_distortion();
 }
 
@@ -57,7 +60,7 @@ MatrixXd ForeseenBeam::known() const {
   const bool knows_beam = now_.beam.cov.diagonal().head(p).minCoeff() > 0.0 && now_.beam.cov.allFinite();
   MatrixXd cov = MatrixXd::Zero(num_, num_);
   if (knows_beam) {
-    cov.topLeftCorner(p, p) = now_.beam.cov.topLeftCorner(p, p);
+    cov.topLeftCorner(p, p) = (now_.beam.cov - now_.sheet.counted()).topLeftCorner(p, p);
   } else {
     cov.diagonal().head(p).setConstant(0.25);
   }
@@ -79,7 +82,7 @@ MatrixXd ForeseenBeam::known() const {
 /// What the shots behind the covariances say of distortion that was held there.
 void ForeseenBeam::count_taken_shots() {
   const auto m = static_cast<Index>(held_.size());
-  MatrixXd all = MatrixXd::Zero(num_ + m, num_ + m);
+  MatrixXd all = MatrixXd::Zero(num_ + m + 1, num_ + m + 1);
   for (const TakenShot& shot : now_.taken) {
     if (m == 0) break;
     const BoardView view = corners_inside(camera_, now_.points_in_board, shot.cam_from_board, 0.0);
@@ -87,6 +90,22 @@ void ForeseenBeam::count_taken_shots() {
   }
   all.topLeftCorner(num_, num_) = information_;
   information_ = std::move(all);
+}
+
+/// Of a sheet before the print what the shots behind the covariances say, as it was stated with them.
+void ForeseenBeam::put_sheet() {
+  const CountedSheet& sheet = now_.sheet;
+  const Index last = information_.rows() - 1, p = problem_.num_free();
+  if (!(sheet.left_m > 0.0)) return;
+  const Index num = now_.refine == Refine::beam ? p : num_;
+  Eigen::VectorXd moves = Eigen::VectorXd::Zero(num);
+  moves.head(p) = sheet.moves.head(p) / sheet.left_m;
+  const Eigen::VectorXd column = -information_.topLeftCorner(num, num) * moves;
+  information_.col(last).head(num_).setZero();
+  information_.col(last).head(num) = column;
+  information_.row(last) = information_.col(last).transpose();
+  const double known = std::max(0.0, std::pow(sheet.left_m, -2) - std::pow(sheet.sigma_m, -2));
+  information_(last, last) = known - column.dot(moves);
 }
 
 std::optional<BoardView> ForeseenBeam::board_at(const Rigid3& cam_from_board) const {
@@ -113,9 +132,18 @@ std::optional<MatrixXd> ForeseenBeam::information_of(double range_m, const Rigid
   }
   BeamProblem one = problem_;
   one.shots = {shot};
-  const auto system = common_system(one, prior_, state);
-  if (!system) return std::nullopt;
-  return system->information();
+  const ReducedSystem system = reduced_system(one, prior_, state);
+  if (system.shots.empty()) return std::nullopt;
+  const ReducedShot& seen = system.shots.front();
+  const auto places = system.places(problem_.num_free(), prior_.free);
+  const auto num = static_cast<Index>(places.size());
+  MatrixXd information = MatrixXd::Zero(num + 1, num + 1);
+  information.topLeftCorner(num, num) = seen.A(places, places);
+  const Eigen::Vector3d sheet = sheet_share(shot, now_.beam, camera_, one.model);
+  information.col(num).head(num) = seen.errors.by_common(Eigen::all, places).transpose() * sheet;
+  information.row(num).head(num) = information.col(num).head(num).transpose();
+  information(num, num) = sheet.dot(seen.errors.I * sheet);
+  return information;
 }
 
 MatrixXd ForeseenBeam::joint_cov(const MatrixXd& information, bool frees_distortion) const {
@@ -125,20 +153,39 @@ MatrixXd ForeseenBeam::joint_cov(const MatrixXd& information, bool frees_distort
     const MatrixXd C = camera_.cov(prior_.free, prior_.free);
     MatrixXd cov = MatrixXd::Zero(num_, num_);
     const MatrixXd of_shots = scaled_inverse(information.topLeftCorner(p, p));
-    const MatrixXd G = -of_shots * information.topRightCorner(p, k);
+    const MatrixXd G = -of_shots * information.block(0, p, p, k);
     cov.topLeftCorner(p, p) = of_shots + G * C * G.transpose();
     cov.topRightCorner(p, k) = G * C;
     cov.bottomRightCorner(k, k) = C;
     return cov;
   }
   if (!frees_distortion) return scaled_inverse(information.topLeftCorner(num_, num_));
-  MatrixXd with_prior = information;
+  const Index num = information.rows() - 1;
+  MatrixXd with_prior = information.topLeftCorner(num, num);
   const Camera open = with_open_distortion(camera_);
   for (std::size_t i = 0; i < held_.size(); ++i) {
     const Index at = num_ + static_cast<Index>(i);
     with_prior(at, at) += 1.0 / open.cov(held_[i], held_[i]);
   }
   return scaled_inverse(with_prior);
+}
+
+/// What a sheet adds to the beam's covariance, with the information of all and the covariance of what is estimated.
+BeamMatrix ForeseenBeam::counted_sheet(const MatrixXd& information, const MatrixXd& cov) const {
+  CountedSheet sheet = now_.sheet;
+  if (!(sheet.left_m > 0.0)) return BeamMatrix::Zero();
+  const Index p = problem_.num_free();
+  const bool alone = now_.refine == Refine::beam && num_ > p;  // the lens does not follow it
+  const MatrixXd inverse = alone ? scaled_inverse(information.topLeftCorner(p, p)) : cov;
+  const Eigen::VectorXd column = information.col(information.rows() - 1).head(inverse.rows());
+  const Eigen::VectorXd moves = -inverse * column;
+  sheet.left_m = left_of(sheet.sigma_m, information.diagonal().tail<1>()[0] + column.dot(moves));
+  sheet.moves.setZero();
+  sheet.moves.head(p) = sheet.left_m * moves.head(p);
+  BeamMatrix of_beam = BeamMatrix::Zero();
+  of_beam.topLeftCorner(p, p) = cov.topLeftCorner(p, p);
+  sheet.share = counted_share(sheet, of_beam);
+  return sheet.counted();
 }
 
 bool ForeseenBeam::wants_free_distortion() const {
@@ -164,7 +211,8 @@ bool ForeseenBeam::wants_free_distortion() const {
 
 MatrixXd ForeseenBeam::cov_with(const MatrixXd& added) const {
   const int p = problem_.num_free();
-  return joint_cov(information_ + added, frees_distortion_).topLeftCorner(p, p);
+  const MatrixXd all = information_ + added, cov = joint_cov(all, frees_distortion_);
+  return cov.topLeftCorner(p, p) + counted_sheet(all, cov).topLeftCorner(p, p);
 }
 
 void ForeseenBeam::add(const MatrixXd& added) {
@@ -180,6 +228,7 @@ BeamBound ForeseenBeam::bound() const {
   Camera camera = camera_;
   beam.cov.setZero();
   beam.cov.topLeftCorner(p, p) = cov.topLeftCorner(p, p);
+  beam.cov += counted_sheet(information_, cov);
   if (k > 0) {
     const std::vector<int> lens(prior_.free.begin(), prior_.free.begin() + k);
     camera.cov(lens, lens) = cov.bottomRightCorner(k, k);

@@ -9,8 +9,9 @@
 namespace alidade {
 
 /// What is known of a beam and its lens, and what rangefinder() states of the beam with more shots: the lens free with
-/// it (Refine::all) or fixed and its covariance carried (Refine::beam), and radial distortion that the camera file
-/// gives without σ held, or estimated too once wants_distortion() says so. Keeps references to what it is made from.
+/// it (Refine::all) or fixed and its covariance carried (Refine::beam), and distortion that the camera file gives
+/// without σ held, or estimated too once wants_distortion() says so; of a sheet before the print what the shots leave
+/// open. Keeps references to what it is made from.
 class ForeseenBeam {
  public:
   explicit ForeseenBeam(const BeamNow& now);
@@ -32,8 +33,10 @@ class ForeseenBeam {
  private:
   [[nodiscard]] Eigen::MatrixXd known() const;
   [[nodiscard]] Eigen::MatrixXd joint_cov(const Eigen::MatrixXd& information, bool frees_distortion) const;
+  [[nodiscard]] BeamMatrix counted_sheet(const Eigen::MatrixXd& information, const Eigen::MatrixXd& cov) const;
   [[nodiscard]] bool wants_free_distortion() const;
   void count_taken_shots();
+  void put_sheet();
 
   const BeamNow& now_;
   Camera camera_;  ///< Of a model that has distortion.
@@ -41,7 +44,7 @@ class ForeseenBeam {
   LensPrior prior_;              ///< Free: what has a σ, then `held_`. Without information: that is in what is known.
   std::vector<int> held_;        ///< Distortion without σ, that may be estimated too.
   Eigen::Index num_ = 0;         ///< Of the beam's and the lens' parameters but `held_`.
-  Eigen::MatrixXd information_;  ///< Of the beam, what has a σ, and `held_` (this without a prior).
+  Eigen::MatrixXd information_;  ///< Of the beam, what has a σ, and `held_` and a sheet (these without a prior).
   bool frees_distortion_ = false;
 };
 

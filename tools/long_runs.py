@@ -81,7 +81,7 @@ def walk_at(t):
 
 
 class WalkSource:
-    """Numbered points that a camera sees; six of them, given to a millimetre, are the target."""
+    """Numbered points that a camera sees; six of them, given to a millimetre (and off by that), are the target."""
 
     def __init__(self, folder, frames, seed):
         self.noise, self.frames = random.Random(seed), frames
@@ -89,8 +89,10 @@ class WalkSource:
         self.points = target + [(self.noise.uniform(-4.0, 4.0), self.noise.uniform(-0.8, 0.8), self.noise.uniform(1.0, 2.2))
                                 for _ in range(160)]
         (folder / "camera.yaml").write_text("model: pinhole\nwidth: 768\nheight: 576\nfx: 610\nfy: 610\ncx: 384\ncy: 288\nskew: 0\n")
+        errors = random.Random(seed + 1000)
+        given = [[x + errors.gauss(0.0, 0.001) for x in point] for point in target]
         (folder / "target.yaml").write_text("points:\n" + "".join(
-            f"  - {{id: {i}, x_m: {x}, y_m: {y}, z_m: {z}, sigma_m: 0.001}}\n" for i, (x, y, z) in enumerate(target)))
+            f"  - {{id: {i}, x_m: {x}, y_m: {y}, z_m: {z}, sigma_m: 0.001}}\n" for i, (x, y, z) in enumerate(given)))
 
     def rows(self):
         yield "frame,t_s,point_id,u_px,v_px"

@@ -20,6 +20,16 @@ std::string asked_text(const GivenNumber& given) {
   return text_of(asked, 2);
 }
 
+/// Behind a flat port another focal length and water of another index look alike.
+std::string as_water_text(const Localization& report) {
+  const std::vector<std::string> names = param_names(report.camera.lens);
+  const auto index = std::ranges::find(names, "n_water") - names.begin();
+  if (index == std::ssize(names) || std::ranges::find(report.lens_params, "fx") == report.lens_params.end()) return "";
+  const Eigen::VectorXd now = params(report.camera.lens), given = params(report.given_camera->lens);
+  return " (water of index " + text_of(given[index] * now[0] / given[0], 4) + " and not " + text_of(given[index], 4) +
+         " looks the same)";
+}
+
 }  // namespace
 
 double moved_sigmas(const GivenNumber& given, const Localization& report) {
@@ -80,7 +90,7 @@ std::string lens_changes(const Localization& report) {
                  : name + " " + sign + text_of(by, 2)) +
             " (" + text_of(z, 2) + "σ)";
   }
-  return text;
+  return text + as_water_text(report);
 }
 
 }  // namespace alidade

@@ -78,7 +78,10 @@ bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   const Eigen::VectorXd score = all.score(open);
   const double num_left =
       2.0 * static_cast<double>(observations_.size()) - 6.0 * static_cast<double>(state_.poses.size());
-  const double noise = std::max(1.0, system.observed_cost / std::max(num_left, 1.0));
+  // Matches of images may be far better than the σ that is the least of any: what is left over says by how much, up to
+  // a half.
+  const double least_noise = problem_.compares_causes ? 1.0 : 0.25;
+  const double noise = std::max(least_noise, system.observed_cost / std::max(num_left, 1.0));
   constexpr double far_more = 60.0;
   if (!(squared_mahalanobis(score, noise * information + information * known * information) > far_more)) return false;
   return squared_mahalanobis(score, information) > best_cause(all);

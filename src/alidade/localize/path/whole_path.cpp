@@ -156,6 +156,28 @@ void solve_with_remaining(std::span<const ObservationFrame> frames, bool frees_l
   }
 }
 
+/// Matches of images have a least σ, what patches of real things are off by. Where what is left over is far below it,
+/// as of rendered ones, it is taken for two and a half times that, and the path is solved once more.
+void solve_with_found_sigma(std::span<const ObservationFrame> frames, const LocalizeConfig& config,
+                            SmootherProblem& given, SmoothedPath& smoothed, Localization& result) {
+  constexpr double far_below = 0.1, generous = 2.5;  // squares over σ²
+  if (!result.is_of_images || config.sigma_px || !(smoothed.chi2_per_dof < far_below)) return;
+  const double least_px = config.features.sigma_floor_px;
+  const double found_px = generous * std::sqrt(smoothed.chi2_per_dof) * least_px;
+  SmootherProblem problem = given;
+  begin_at(smoothed, 1.0, problem);
+  problem.usual_variance *= least_px * least_px / (found_px * found_px);
+  for (UsedObservation& each : problem.observations)
+    each.sigma_px = std::sqrt(std::max(each.sigma_px * each.sigma_px - least_px * least_px, 0.0) + found_px * found_px);
+  Localization again = result;
+  auto by_found = smooth(problem, frames, again);
+  if (!by_found) return;
+  result = std::move(again);
+  result.sigma_px = found_px;
+  smoothed = std::move(*by_found);
+  given = std::move(problem);
+}
+
 /// Each point's distance from where it was first seen is believed to be what it is now, so vaguely that all of them
 /// together say the scale to `sigma_rel`, and nothing else.
 void believe_distances(double sigma_rel, SmootherProblem& problem) {
@@ -323,23 +345,6 @@ double solve_with_imu(const Recording& recording, const LocalizeConfig& config, 
 
 }  // namespace
 
-std::size_t num_untied(std::span<const PlacedResidual> residuals, std::size_t first_frame,
-                       std::span<const PathStep> path) {
-  constexpr std::size_t near = 15, enough = 8;
-  std::size_t num = 0;
-  for (std::size_t k = first_frame; k < path.size(); ++k) {
-    if (path[k].event != FrameEvent::restarted) continue;
-    std::set<long> before, both;
-    for (const PlacedResidual& residual : residuals) {
-      const std::size_t at = first_frame + residual.frame;
-      if (at + near >= k && at < k) before.insert(residual.id);
-      if (at >= k && at <= k + near && before.contains(residual.id)) both.insert(residual.id);
-    }
-    num += both.size() < enough ? 1 : 0;
-  }
-  return num;
-}
-
 std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEngine& engine,
                                     const LocalizeConfig& config, Localization& result) {
   if (!engine.has_begun()) return std::nullopt;
@@ -361,6 +366,7 @@ std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEn
   if (!smoothed) return std::nullopt;
   if (lacks_points || (!result.is_of_images && has_other_lens(*smoothed, *problem)))
     solve_with_remaining(frames.frames(), frees_lens, *problem, *smoothed, kept);
+  solve_with_found_sigma(frames.frames(), config, *problem, *smoothed, kept);
   const double by_sensors = solve_in_metres(recording, config, *problem, *smoothed, kept);
   const double scale = by_sensors * solve_with_imu(recording, config, *problem, *smoothed, kept);
   if (kept.imu) kept.imu->scale *= by_sensors;

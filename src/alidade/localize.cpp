@@ -6,12 +6,15 @@
 #include <optional>
 #include <utility>
 
+#include "alidade/estimation/median.h"
 #include "alidade/localize/checks/judge.h"
 #include "alidade/localize/checks/lens_kind.h"
 #include "alidade/localize/checks/missing_frames.h"
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
 #include "alidade/localize/frames/image_localizer.h"
+#include "alidade/localize/map/map_frame.h"
+#include "alidade/localize/map/moved_points.h"
 #include "alidade/localize/observation_localizer.h"
 #include "alidade/localize/setup.h"
 
@@ -21,8 +24,9 @@ namespace {
 /// The map of a table for another run to begin in: points by their numbers.
 void save_numbered(Localization& result) {
   for (const MapPoint& point : result.map)
-    if (point.id >= 0 && point.cov.allFinite() && point.cov.diagonal().minCoeff() > 0.0)
-      result.saved_map.points.push_back({point.id, point.point_in_world, point.cov, {}});
+    if (const Eigen::Matrix3d cov = point.cov_in_map.value_or(point.cov);
+        point.id >= 0 && cov.allFinite() && cov.diagonal().minCoeff() > 0.0)
+      result.saved_map.points.push_back({point.id, point.point_in_world, cov, {}});
 }
 
 /// Scale from sensors beside the camera.
@@ -38,12 +42,24 @@ void add_scale(const LocalizeConfig& config, Localization& result) {
   add_imu_scale(config, result);
 }
 
+/// What moved is where the path has it now.
+void add_moved_points(const MovedMapPoints& moved, bool is_left_out, Localization& result) {
+  std::vector<double> moves_m;
+  for (std::size_t i = 0; i < moved.ids.size(); ++i) {
+    const auto at = std::ranges::find(result.map, moved.ids[i], &MapPoint::id);
+    if (at != result.map.end()) moves_m.push_back((at->point_in_world - moved.places[i]).norm());
+  }
+  result.moved_points = {moved.ids.size(), moved.num_judged, moved.num_as_one, 0.0, is_left_out};
+  if (is_left_out && !moves_m.empty()) result.moved_points.median_m = median_of(std::move(moves_m));
+}
+
 /// A result that says no more than what was given.
 Localization described(const LocalizeConfig& config, const Camera& camera) {
   Localization result;
   result.camera = camera;
   result.is_in_map = config.map.has_value();
   result.has_target = result.is_in_map || !config.target.points.empty();
+  result.lacks_map_frame = config.map && config.map->is_in_metres && !config.map->frame;
   result.scale_known = config.map ? config.map->is_in_metres : result.has_target;
   result.is_scale_given = config.target.is_scale_given;
   result.sigma_px = config.filter.sigma_px;
@@ -59,10 +75,17 @@ struct Localizer::Run {
   std::optional<ObservationLocalizer> of_observations;
   std::optional<ImageLocalizer> of_images;
   std::vector<PathStep> path;
-  std::size_t num_judged = 0;  ///< Of them, by recent().
+  std::size_t num_judged = 0;                ///< Of them, by recent().
+  std::optional<MovedMapPoints> moved = {};  ///< Of the map that an earlier run has left, and not in this one's.
 
   [[nodiscard]] double last_t_s() const {
     return path.empty() ? std::numeric_limits<double>::quiet_NaN() : path.back().t_s;
+  }
+  /// Of the map, those that are not where it has them.
+  [[nodiscard]] MovedMapPoints moved_points() const {
+    if (moved) return *moved;
+    if (!of_observations || !config.map) return {};
+    return moved_map_points(camera, of_observations->numbered_frames(), *config.map, config.filter.sigma_px);
   }
   template <typename Take>
   const PathStep& timed(const Take& take) {
@@ -75,7 +98,7 @@ struct Localizer::Run {
 
 Localizer::Localizer(const Camera& camera, const LocalizeConfig& config) {
   require_sense(config, camera);
-  run_ = std::make_unique<Run>(Run{known_camera(camera, config), config, {}, {}, {}, 0});
+  run_ = std::make_unique<Run>(Run{known_camera(camera, config), config, {}, {}, {}, 0, {}});
 }
 
 Localizer::~Localizer() = default;
@@ -121,9 +144,34 @@ Verdict Localizer::recent() {
   return live_verdict(recent);
 }
 
+/// Where points of the map moved since it was made: all once more by the others.
+std::optional<Localization> Localizer::finished_without(MovedMapPoints moved, std::span<const TimedPose> truth) const {
+  const Run& run = *run_;
+  const std::vector<ObservationFrame> frames = run.of_observations->numbered_frames();
+  if (frames.size() != run.path.size()) return std::nullopt;
+  LocalizeConfig config = run.config;
+  config.target.points.clear();
+  std::erase_if(config.map->points,
+                [&](const SavedPoint& point) { return std::ranges::binary_search(moved.ids, point.id); });
+  config.watch = {};
+  config.inspect = {};
+  config.seconds = {};
+  Localizer again(run.camera, config);
+  again.run_->moved = std::move(moved);
+  for (const ObservationFrame& frame : frames) again.push(frame);
+  for (std::size_t k = 0; k < frames.size(); ++k) again.run_->path[k].seconds = run.path[k].seconds;
+  Localization result = again.finish(truth);
+  const State state = result.verdict.state;
+  if (state == State::refused || state == State::not_converged) return std::nullopt;
+  return result;
+}
+
 Localization Localizer::finish(std::span<const TimedPose> truth) const {
   require_sense(truth);
   const Run& run = *run_;
+  const MovedMapPoints moved = run.moved_points();
+  if (!moved.ids.empty() && !run.moved)
+    if (auto without = finished_without(moved, truth)) return *std::move(without);
   Localization result = described(run.config, run.camera);
   result.path = run.path;
   result.truth.assign(truth.begin(), truth.end());
@@ -134,6 +182,8 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
   else if (run.of_observations)
     run.of_observations->sum_up(result);
   add_scale(run.config, result);
+  add_moved_points(moved, run.moved.has_value(), result);
+  if (run.config.map && run.config.map->frame) widen_by_frame(*run.config.map->frame, result);
   if (const auto sigma_s = sigma_of_times(run.config, result)) widen_by_times(*sigma_s, result);
   result.saved_map.is_in_metres = result.scale_known;
   if (run.of_images)

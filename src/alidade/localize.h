@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "alidade/camera/camera.h"
@@ -13,6 +14,7 @@
 
 /// The path of a moving camera and the map of the points that it sees: the whole job, as `alidade localize` does it.
 namespace alidade {
+struct MovedMapPoints;
 ALIDADE_PUBLIC_BEGIN
 
 /// From observations of numbered points, frames in order of time. Throws ConfigError for an invalid config,
@@ -50,6 +52,8 @@ class Localizer {
 
  private:
   struct Run;
+  [[nodiscard]] std::optional<Localization> finished_without(MovedMapPoints moved,
+                                                             std::span<const TimedPose> truth) const;
   std::unique_ptr<Run> run_;
 };
 

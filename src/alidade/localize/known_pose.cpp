@@ -8,7 +8,6 @@
 
 #include "alidade/board/board_pose.h"
 #include "alidade/geometry/decompositions.h"
-#include "alidade/geometry/three_point_pose.h"
 #include "alidade/localize/path/path_resection.h"
 
 namespace alidade {
@@ -164,66 +163,31 @@ bool is_flat(const SeenPoints& seen) {
 }
 
 /// What is seen of the known points, as a resection takes it.
-struct InSpace {
+std::vector<PlacedObservation> in_space(std::span<const FeatureObservation> observations,
+                                        std::span<const KnownPoint> known, double sigma_px) {
   std::vector<PlacedObservation> placed;
-  std::vector<Eigen::Vector3d> rays_in_cam;
-};
-
-InSpace in_space(const Camera& camera, std::span<const FeatureObservation> observations,
-                 std::span<const KnownPoint> known, double sigma_px) {
-  InSpace seen;
   for (const FeatureObservation& observation : observations) {
     const auto at = std::ranges::find(known, observation.id, &KnownPoint::id);
-    const auto ray = unproject(camera, observation.px);
-    if (at == known.end() || !ray) continue;
+    if (at == known.end()) continue;
     const Eigen::Matrix3d cov = at->sigma_m * at->sigma_m * Eigen::Matrix3d::Identity();
-    seen.placed.push_back({observation.px, std::max(sigma_px, observation.sigma_px), at->point_in_world, cov});
-    seen.rays_in_cam.push_back(*ray);
+    placed.push_back({observation.px, std::max(sigma_px, observation.sigma_px), at->point_in_world, cov});
   }
-  return seen;
-}
-
-/// Poses from drawn sets of three, those that explain most first.
-std::vector<Rigid3> poses_of_threes(const Camera& camera, const InSpace& seen) {
-  constexpr int num_draws = 60;           // with 40 % mismatches one in five sets is right
-  constexpr double near_px2 = 8.0 * 8.0;  // three noisy rays locate the others so well
-  constexpr std::size_t max_poses = 6;
-  const std::size_t num = seen.placed.size();
-  std::mt19937_64 bits(1);
-  std::vector<std::pair<double, Rigid3>> scored;
-  for (int draw = 0; draw < num_draws; ++draw) {
-    const std::size_t a = bits() % num, b = bits() % num, c = bits() % num;
-    if (a == b || b == c || a == c) continue;
-    for (const Rigid3& pose : three_point_poses(
-             {seen.placed[a].point_in_world, seen.placed[b].point_in_world, seen.placed[c].point_in_world},
-             {seen.rays_in_cam[a], seen.rays_in_cam[b], seen.rays_in_cam[c]})) {
-      double score = 0.0;
-      for (const PlacedObservation& each : seen.placed) {
-        const auto px = project(camera, pose.inverse() * each.point_in_world);
-        if (px) score += 1.0 / (1.0 + (*px - each.px).squaredNorm() / near_px2);
-      }
-      scored.emplace_back(score, pose);
-    }
-  }
-  std::ranges::stable_sort(scored, std::greater{}, [](const auto& each) { return each.first; });
-  std::vector<Rigid3> poses;
-  for (std::size_t i = 0; i < std::min(scored.size(), max_poses); ++i) poses.push_back(scored[i].second);
-  return poses;
+  return placed;
 }
 
 /// The start at a pose, with the covariance that the observations that fit give it.
-std::optional<StartHypothesis> start_at(const Camera& camera, const InSpace& seen, const CameraResection& found,
-                                        const KnownPoseConfig& config) {
+std::optional<StartHypothesis> start_at(const Camera& camera, std::span<const PlacedObservation> placed,
+                                        const CameraResection& found, const KnownPoseConfig& config) {
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
-  for (std::size_t i = 0; i < seen.placed.size(); ++i) {
+  for (std::size_t i = 0; i < placed.size(); ++i) {
     if (!found.fits[i]) continue;
     Feature feature;
-    feature.values.head<3>() = seen.placed[i].point_in_world;
+    feature.values.head<3>() = placed[i].point_in_world;
     const auto view = expected_view(camera, found.world_from_cam, feature);
     if (!view) return std::nullopt;
     const Eigen::Matrix<double, 2, 3> J_point = view->J_px_feature.leftCols<3>();
-    const Eigen::Matrix2d cov = J_point * seen.placed[i].cov * J_point.transpose() +
-                                std::pow(seen.placed[i].sigma_px, 2) * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix2d cov =
+        J_point * placed[i].cov * J_point.transpose() + std::pow(placed[i].sigma_px, 2) * Eigen::Matrix2d::Identity();
     information += view->J_px_pose.transpose() * cov.inverse() * view->J_px_pose;
   }
   const Llt llt(information);
@@ -237,15 +201,18 @@ std::optional<StartHypothesis> start_at(const Camera& camera, const InSpace& see
 }
 
 /// Of points in no plane: the poses that enough observations agree on, the likeliest first.
-std::vector<StartHypothesis> poses_in_space(const Camera& camera, const InSpace& seen, const KnownPoseConfig& config) {
-  const std::size_t num = seen.placed.size();
+std::vector<StartHypothesis> poses_in_space(const Camera& camera, std::span<const PlacedObservation> placed,
+                                            const KnownPoseConfig& config) {
+  constexpr int num_draws = 60;  // with 40 % mismatches one in five sets is right
+  constexpr std::size_t max_poses = 6;
+  const std::size_t num = placed.size();
   if (num < 4) return {};
   std::vector<StartHypothesis> starts;
-  for (const Rigid3& begin : poses_of_threes(camera, seen)) {
+  for (const Rigid3& begin : poses_of_threes(camera, placed, num_draws, max_poses)) {
     const std::array<Rigid3, 1> from{begin};
-    const auto found = resection(camera, seen.placed, from, max_chi2);
+    const auto found = resection(camera, placed, from, max_chi2);
     if (!found || found->num_fit < min_agreeing(num)) continue;
-    auto start = start_at(camera, seen, *found, config);
+    auto start = start_at(camera, placed, *found, config);
     if (!start) continue;
     start->cost = found->cost;
     const bool is_twice = std::ranges::any_of(starts, [&](const StartHypothesis& other) {
@@ -273,7 +240,7 @@ std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<co
   std::erase_if(fits,
                 [](const BoardPoseFit& fit) { return !(fit.chi2 <= max_pose_chi2_per_dof * std::max(fit.dof, 2)); });
   if (fits.empty() && !is_flat(seen))
-    return poses_in_space(camera, in_space(camera, observations, known, config.sigma_px), config);
+    return poses_in_space(camera, in_space(observations, known, config.sigma_px), config);
   std::vector<StartHypothesis> starts;
   for (const BoardPoseFit& fit : fits) starts.push_back(start_of(fit, seen, config));
   return starts;

@@ -49,6 +49,8 @@ struct MapPoint {
   Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
   bool is_known = false;
   std::size_t num_seen = 0;
+  /// Without what the errors of all points have in common (saved_map.frame). None: not known apart.
+  std::optional<Eigen::Matrix3d> cov_in_map = {};
 };
 
 /// A parameter taken as given: how an error of it would move the path, and its score test (Lagrange multiplier test):
@@ -121,6 +123,15 @@ struct MissingFrames {
   int num = 0;
 };
 
+/// Of the points of a map that an earlier run has left: those that are no longer where it has them. They are new points
+/// of the path's map.
+struct MovedPoints {
+  std::size_t num = 0, num_judged = 0;  ///< Of those that could be judged.
+  std::size_t num_as_one = 0;           ///< Of those that moved, so many moved together.
+  double median_m = 0.0;                ///< How far; 0: not known.
+  bool is_left_out = true;              ///< The path is by the others alone.
+};
+
 /// How far an estimated path is from the true one. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM
 /// Systems", IROS 2012: ATE is the RMS distance of positions after alignment; RPE the RMS translation of
 /// (Q_i⁻¹ Q_i+1)⁻¹ (P_i⁻¹ P_i+1) between neighbours, with the aligned scale.
@@ -150,7 +161,9 @@ struct Localization {
   double sigma_target_scale = 0.0;         ///< Of the scale by where the target's points are, relative.
   std::optional<ImuEstimate> imu;          ///< Where one was given.
   bool has_target = false;                 ///< Known points were given,
-  bool is_in_map = false;                  ///< as a map that was saved.
+  bool is_in_map = false;                  ///< as a map that was saved,
+  bool lacks_map_frame = false;            ///< whose file has nothing about the errors of its frame,
+  MovedPoints moved_points;                ///< and of which some moved since, of tables.
   bool is_of_images = false;
   bool lacks_circle = false;  ///< A circle was to be masked around, and no image shows one: nothing is masked.
   double still_share = 0.0;   ///< Of the image, edges that never move while the scene does: masked.

@@ -27,6 +27,8 @@ class ObservationLocalizer {
   void sum_up_recent(Localization& recent);
   /// As they are kept for it.
   [[nodiscard]] const std::vector<ObservationFrame>& frames() const { return frames_.frames(); }
+  /// The same by the points' own numbers.
+  [[nodiscard]] std::vector<ObservationFrame> numbered_frames() const;
 
  private:
   [[nodiscard]] double period_s() const;

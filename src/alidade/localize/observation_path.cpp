@@ -13,6 +13,13 @@ Recording ObservationLocalizer::recording(const KeptFrames& frames) const {
   return recording;
 }
 
+std::vector<ObservationFrame> ObservationLocalizer::numbered_frames() const {
+  std::vector<ObservationFrame> frames = frames_.frames();
+  for (ObservationFrame& frame : frames)
+    for (FeatureObservation& each : frame.observations) each.id = episodes_.number(each.id);
+  return frames;
+}
+
 /// From one place what seems a parallax grows with the number of poses (frames/still_frames.h): where the camera hardly
 /// translates, some fifty frames are solved for, if need be of known points alone. An IMU's readings are of all frames.
 std::optional<ObservationLocalizer::Solution> ObservationLocalizer::solved(Localization& result) const {

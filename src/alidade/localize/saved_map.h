@@ -33,10 +33,19 @@ struct SavedKeyframe {
   GreyPatch thumbnail;
 };
 
+/// What all points of a map have in common of their errors: those of its frame, as of a target that it was made in
+/// front of.
+struct SavedFrame {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  /// Of a translation of the map [m], a rotation about the centre [rad] and a change of size, relative.
+  Eigen::Matrix<double, 7, 7> cov = Eigen::Matrix<double, 7, 7>::Zero();
+};
+
 /// The map of a run, for later runs to start in: `localize --map`.
 struct SavedMap {
   bool is_in_metres = false;
-  std::vector<SavedPoint> points = {};
+  std::vector<SavedPoint> points = {};        ///< Their covariances are of errors beside the frame's.
+  std::optional<SavedFrame> frame = {};       ///< None: not known.
   std::vector<SavedKeyframe> keyframes = {};  ///< Of images.
 };
 

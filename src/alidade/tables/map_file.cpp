@@ -78,6 +78,28 @@ Eigen::Matrix3d map_covariance_of(const Fields& fields) {
   return cov;
 }
 
+std::vector<double> upper_of(const Eigen::Matrix<double, 7, 7>& cov) {
+  std::vector<double> numbers;
+  for (int i = 0; i < 7; ++i)
+    for (int j = i; j < 7; ++j) numbers.push_back(cov(i, j));
+  return numbers;
+}
+
+SavedFrame read_frame(const YAML::Node& node, const Fields& map) {
+  const Fields fields(node, map.file(), "frame.");
+  detail::refuse_unknown_keys(fields, {"centre", "covariance"}, "a map's frame");
+  SavedFrame frame{map_matrix_of(fields, "centre", 3, 1), {}};
+  const Eigen::VectorXd upper = map_matrix_of(fields, "covariance", 28, 1);
+  for (int i = 0, at = 0; i < 7; ++i)
+    for (int j = i; j < 7; ++j) frame.cov(i, j) = frame.cov(j, i) = upper[at++];
+  constexpr double rounding = 1e-6;  // of correlations
+  const Eigen::Vector<double, 7> sigma = frame.cov.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Matrix<double, 7, 7> most = (1.0 + rounding) * sigma * sigma.transpose();
+  if (!frame.centre.allFinite() || !frame.cov.allFinite() || !(frame.cov.cwiseAbs().array() <= most.array()).all())
+    refuse(fields.file(), fields.full("covariance"), "is no covariance");
+  return frame;
+}
+
 SavedLook read_look(const YAML::Node& node, const Fields& point) {
   const Fields fields(node, point.file(), point.full("look") + ".");
   detail::refuse_unknown_keys(fields, {"position", "quaternion_wxyz", "offset_px", "surface", "derivative", "grey"},
@@ -97,7 +119,11 @@ SavedLook read_look(const YAML::Node& node, const Fields& point) {
 
 std::string map_text(const SavedMap& map) {
   std::string text = "# a map for `alidade localize --map`\n";
-  text += fmt::format("in_metres: {}\npoints:\n", map.is_in_metres);
+  text += fmt::format("in_metres: {}\n", map.is_in_metres);
+  if (map.frame)
+    text += fmt::format("frame: {{centre: {},\n  covariance: {}}}\n", number_list(entries_of(map.frame->centre)),
+                        number_list(upper_of(map.frame->cov)));
+  text += "points:\n";
   for (const SavedPoint& point : map.points) {
     const Eigen::Matrix3d& c = point.cov;
     text += fmt::format("  - {{id: {}, position: {}, covariance: {}", point.id,
@@ -122,11 +148,12 @@ SavedMap read_map(const std::filesystem::path& file) {
   const std::string name = file.string();
   const YAML::Node root = detail::load_yaml(read_file(file), name);
   const Fields fields(root, name);
-  detail::refuse_unknown_keys(fields, {"in_metres", "points", "keyframes"}, "a map");
+  detail::refuse_unknown_keys(fields, {"in_metres", "frame", "points", "keyframes"}, "a map");
   SavedMap map;
   const std::string in_metres = fields.text("in_metres");
   if (in_metres != "true" && in_metres != "false") refuse(name, "in_metres", "is neither true nor false");
   map.is_in_metres = in_metres == "true";
+  if (fields.has("frame")) map.frame = read_frame(root["frame"], fields);
   const YAML::Node points = root["points"];
   if (!points.IsSequence() || points.size() == 0) refuse(name, "points", "has no points");
   std::set<long> ids;

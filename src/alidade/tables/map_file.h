@@ -9,7 +9,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Text of map.yaml: `in_metres`, `points: [{id, position, covariance, look}]` (upper triangle; `look` of maps of
+/// Text of map.yaml: `in_metres`, `frame: {centre, covariance}` (what all points' errors have in common: translation,
+/// rotation, size; upper triangle), `points: [{id, position, covariance, look}]` (upper triangle; `look` of maps of
 /// images: a 25 × 25 patch as hexadecimal bytes, and from where it was seen), `keyframes: [{position, quaternion_wxyz,
 /// grey}]`.
 [[nodiscard]] std::string map_text(const SavedMap& map);

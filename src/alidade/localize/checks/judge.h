@@ -22,6 +22,9 @@ namespace alidade {
 /// Checks of those that have.
 void add_imu(const Localization& report, Verdict& verdict);
 
+/// What of a map that an earlier run has left is no longer so, or not known.
+void add_map(const Localization& report, Verdict& verdict);
+
 /// The sensors that say how long the path is: "depth sensor, ± 0.2 %".
 [[nodiscard]] std::string sensors_text(const Localization& report);
 /// What sensors beside the camera say of a scale that is known without them, and two of them of each other.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "alidade/localize/checks/scale_readings.h"
+#include "alidade/localize/map/map_frame.h"
 
 // What all sensors beside the camera say of the scale together.
 
@@ -181,7 +182,10 @@ void apply_scale(const ReadScale& scale, Localization& result) {
     point.point_in_world *= s;
     point.cov *= s * s;
     point.cov += variance * point.point_in_world * point.point_in_world.transpose();
+    if (point.cov_in_map) *point.cov_in_map *= s * s;
   }
+  std::optional<SavedFrame>& frame = result.saved_map.frame;
+  if (frame) frame = scaled_frame(*frame, s, scale.sigma_rel);
 }
 
 }  // namespace alidade

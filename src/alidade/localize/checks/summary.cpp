@@ -144,11 +144,13 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
       result.num_known_gated = result.num_known - std::min(result.num_known, num_known_fit(smoothed, result.map));
     result.nis_per_dof = smoothed.chi2_per_dof;
   }
+  result.saved_map.frame = smoothed.frame;
   for (std::size_t i = 0; i < smoothed.ids.size(); ++i) {
     const auto at = std::ranges::find(result.map, smoothed.ids[i], &MapPoint::id);
     if (at == result.map.end()) continue;
     at->point_in_world = smoothed.points[i];
     at->cov = smoothed.point_covs[i];
+    at->cov_in_map = smoothed.covs_in_map[i];
   }
 }
 

@@ -56,6 +56,7 @@ void ImageLocalizer::sum_up(Localization& result) const {
   std::optional<WholePath> whole;
   if (config_.smooths) whole = whole_path(kept, engine_, config, result);
   engine_.sum_up(kept.num_used, result);
+  result.nis_per_dof *= std::pow(config_.features.sigma_floor_px / result.sigma_px, 2);
   take_over(whole, kept, engine_, config, result);
   if (whole) leave_out_joined(*whole, result);
   result.known_shift = known_shift(result.map, given_);
@@ -72,7 +73,8 @@ void ImageLocalizer::save_map(Localization& result) const {
         landmark.is_saved ? landmark.world_from_first_cam : result.path[landmark.first_step].world_from_cam;
     constexpr double sure = 0.05;  // of the distance: what is vaguer would be looked for in the wrong position
     if (!(std::sqrt(point.cov.trace()) < sure * (point.point_in_world - from.translation).norm())) continue;
-    map.points.push_back({point.id, point.point_in_world, point.cov, look_of(landmark, point.point_in_world, from)});
+    map.points.push_back({point.id, point.point_in_world, point.cov_in_map.value_or(point.cov),
+                          look_of(landmark, point.point_in_world, from)});
   }
   for (const auto& [id, saved] : saved_)  // what of the earlier map was not seen this time
     if (std::ranges::find(map.points, id, &SavedPoint::id) == map.points.end())

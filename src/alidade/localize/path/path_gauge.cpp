@@ -1,5 +1,6 @@
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/localize/map/map_frame.h"
 #include "alidade/localize/path/path_system.h"
 
 // What of a path's covariance is its shape's, where no measurement says where and how large the world is.
@@ -8,12 +9,6 @@ namespace alidade {
 namespace {
 
 using GaugeMatrix = Eigen::Matrix<double, 6, 7>;
-
-Eigen::Matrix<double, 3, 7> moved_place(const Eigen::Vector3d& away) {
-  Eigen::Matrix<double, 3, 7> G;
-  G << Eigen::Matrix3d::Identity(), -cross_matrix(away), away;
-  return G;
-}
 
 /// How the poses of a path move with a motion of the world and its size, and what of their errors counts in the best
 /// alignment.
@@ -25,7 +20,7 @@ struct Gauge {
 
   [[nodiscard]] bool is_determined() const { return normal.min_pivot() > 0.0; }
   [[nodiscard]] Eigen::MatrixXd moves(const Eigen::Vector3d& point) const {
-    return moved_place(point - centre).leftCols(num_free);
+    return similarity_moves(point - centre).leftCols(num_free);
   }
 };
 
@@ -41,7 +36,7 @@ Gauge gauge_of(std::span<const Rigid3> poses, int num_free) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(num_free, num_free);
   for (const Rigid3& pose : poses) {
     GaugeMatrix by = GaugeMatrix::Zero();
-    by.topRows<3>() = moved_place(pose.translation - gauge.centre);
+    by.topRows<3>() = similarity_moves(pose.translation - gauge.centre);
     by.block<3, 3>(3, 3) = pose.rotation.toRotationMatrix().transpose();
     gauge.G.push_back(by.leftCols(num_free));
     gauge.W.push_back(gauge.G.back());
@@ -71,7 +66,7 @@ void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& co
   const Gauge gauge = gauge_of(state_.poses, problem_.gauge == PathGauge::similarity ? 7 : 6);
   if (!gauge.is_determined()) return;
   const std::size_t num = state_.poses.size();
-  PoseChain::Columns Z = system.chain.solve(gauge.W, num_solved());  // covariance with the sums that align
+  PoseChain::Columns Z = system.chain.solve({gauge.W, {}}, num_solved());  // covariance with the sums that align
   Eigen::MatrixXd given = Eigen::MatrixXd::Zero(spread.J.front().cols(), gauge.num_free);
   for (std::size_t k = 0; k < num; ++k) given += spread.J[k].transpose() * gauge.W[k];
   const Eigen::MatrixXd moved_by_given = gauge.normal.solve_each(given.transpose());
@@ -90,6 +85,82 @@ void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& co
     const Eigen::MatrixXd z = Z.points[i] + spread.point_J[i] * considered * given;
     spread.point_cov[i] = aligned_cov(gauge, of_sums, spread.point_cov[i], z, gauge.moves(state_.points[i]));
   }
+}
+
+namespace {
+
+/// How the points of a map move with its frame, and by how much each says where that is.
+struct MapGauge {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  std::vector<Eigen::MatrixXd> G, W;  ///< By point of the map.
+  Ldlt normal;
+
+  MapGauge(std::span<const Eigen::Vector3d> points, std::span<const Eigen::Matrix3d> covs) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      centre += points[i] / covs[i].trace();
+      sum += 1.0 / covs[i].trace();
+    }
+    centre /= sum;
+    Eigen::MatrixXd N = Eigen::MatrixXd::Zero(7, 7);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      G.emplace_back(similarity_moves(points[i] - centre));
+      W.emplace_back(G.back() / covs[i].trace());
+      N += W.back().transpose() * G.back();
+    }
+    normal = Ldlt(N);
+  }
+};
+
+}  // namespace
+
+/// Of points whose frame is given: what their errors have in common is that frame's, and what is left is beside it, at
+/// least a tenth of σ. Where the path's frame is its own only the unit is given, and without a unit nothing.
+void PathSmoother::fill_frame(const SmootherSystem& system, const Eigen::MatrixXd& considered,
+                              const PoseChain::Spread& spread, SmoothedPath& path) const {
+  path.covs_in_map = path.point_covs;
+  if (problem_.gauge == PathGauge::similarity || path.points.size() < 4) return;
+  const MapGauge gauge(path.points, path.point_covs);
+  if (!(gauge.normal.min_pivot() > 0.0)) return;
+  PoseChain::Columns W{{state_.poses.size(), Eigen::MatrixXd::Zero(6, 7)},
+                       {state_.points.size(), Eigen::MatrixXd::Zero(3, 7)}};
+  Eigen::MatrixXd given = Eigen::MatrixXd::Zero(considered.rows(), 7), sums = Eigen::MatrixXd::Zero(7, 7);
+  for (std::size_t i = 0; i < path.ids.size(); ++i) {
+    const std::size_t at = index_of_.at(path.ids[i]);
+    W.points[at] = gauge.W[i];
+    given += spread.point_J[at].transpose() * gauge.W[i];
+  }
+  PoseChain::Columns Z = system.chain.solve(W, num_solved());
+  for (const long id : path.ids) {
+    const std::size_t at = index_of_.at(id);
+    Z.points[at] += spread.point_J[at] * considered * given;
+    sums += W.points[at].transpose() * Z.points[at];
+  }
+  const Eigen::MatrixXd of_sums = gauge.normal.solve_each(gauge.normal.solve_each(sums).transpose());
+  path.frame.centre = gauge.centre;
+  path.frame.cov(6, 6) = of_sums(6, 6);
+  if (problem_.gauge != PathGauge::fixed) return;
+  path.frame.cov = 0.5 * (of_sums + of_sums.transpose());
+  constexpr double least = 0.01;  // of a variance
+  for (std::size_t i = 0; i < path.ids.size(); ++i) {
+    const Eigen::MatrixXd& z = Z.points[index_of_.at(path.ids[i])];
+    const Eigen::MatrixXd across = gauge.G[i] * gauge.normal.solve_each(z.transpose());
+    const Eigen::MatrixXd out =
+        path.point_covs[i] - across - across.transpose() + gauge.G[i] * path.frame.cov * gauge.G[i].transpose();
+    path.covs_in_map[i] = 0.5 * (out + out.transpose()) + least * path.point_covs[i];
+  }
+}
+
+/// The same where a map moves along a direction farther than its covariance has it: its frame does.
+void PathSmoother::widen_frame(std::span<const Eigen::Vector3d> moves, double more, SmoothedPath& path) const {
+  if (path.points.size() < 4) return;
+  const MapGauge gauge(path.points, path.covs_in_map);
+  if (!(gauge.normal.min_pivot() > 0.0)) return;
+  Eigen::VectorXd sums = Eigen::VectorXd::Zero(7);
+  for (std::size_t i = 0; i < moves.size(); ++i) sums += gauge.W[i].transpose() * moves[i];
+  const Eigen::VectorXd move = gauge.normal.solve(sums);
+  path.frame = about_centre(path.frame, gauge.centre);
+  path.frame.cov += more * move * move.transpose();
 }
 
 }  // namespace alidade

@@ -318,7 +318,7 @@ void PathSmoother::fill_imu(const SmootherSystem& system, const Eigen::MatrixXd&
     W.emplace_back(Eigen::MatrixXd::Zero(6, 1));
     if (extent2 > 0.0) W.back().topRows<3>() = (pose.translation - centre) / extent2;
   }
-  const PoseChain::Columns Z = system.chain.solve(W, num_solved());
+  const PoseChain::Columns Z = system.chain.solve({W, {}}, num_solved());
   double variance = 0.0;
   for (std::size_t k = 0; k < W.size(); ++k) variance += W[k].col(0).dot(Z.poses[k].col(0));
   imu.sigma_scale = std::sqrt(std::max(variance, 0.0));

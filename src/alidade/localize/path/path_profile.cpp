@@ -114,11 +114,13 @@ void PathSmoother::widen(double min_cost, SmoothedPath& path) {
     const Eigen::Vector<double, 6> move = right_perturbation(best.poses[k], widest->poses[k]);
     path.cov[k] += more * move * move.transpose();
   }
+  std::vector<Eigen::Vector3d> moves;
   for (std::size_t i = 0; i < path.point_covs.size(); ++i) {
     const std::size_t at = index_of_.at(path.ids[i]);
-    const Eigen::Vector3d move = widest->points[at] - best.points[at];
-    path.point_covs[i] += more * move * move.transpose();
+    moves.emplace_back(widest->points[at] - best.points[at]);
+    path.point_covs[i] += more * moves.back() * moves.back().transpose();
   }
+  widen_frame(moves, more, path);
 }
 
 }  // namespace alidade

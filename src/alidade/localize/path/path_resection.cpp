@@ -1,8 +1,12 @@
 #include "alidade/localize/path/path_resection.h"
-#include "alidade/geometry/decompositions.h"
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <random>
+
+#include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/three_point_pose.h"
 
 namespace alidade {
 namespace {
@@ -63,13 +67,13 @@ bool stepped(const Camera& camera, std::span<const PlacedObservation> observatio
 }  // namespace
 
 std::optional<CameraResection> resection(const Camera& camera, std::span<const PlacedObservation> observations,
-                                         std::span<const Rigid3> begin_at, double gate) {
+                                         std::span<const Rigid3> begin_at, double gate, double widest_px) {
   constexpr std::size_t min_observations = 3;
   if (observations.size() < min_observations) return std::nullopt;
   std::optional<CameraResection> best;
   for (const Rigid3& begin : begin_at) {
     Rigid3 world_from_cam = begin;
-    constexpr double widest_px = 64.0, narrowest_px = 1.0;
+    constexpr double narrowest_px = 1.0;
     for (double wide_px = widest_px; wide_px >= narrowest_px; wide_px *= 0.6)
       if (!stepped(camera, observations, wide_px, world_from_cam)) break;
     for (const Rigid3& there : {begin, world_from_cam}) {
@@ -78,6 +82,40 @@ std::optional<CameraResection> resection(const Camera& camera, std::span<const P
     }
   }
   return best;
+}
+
+std::vector<Rigid3> poses_of_threes(const Camera& camera, std::span<const PlacedObservation> observations,
+                                    int num_draws, std::size_t max_poses) {
+  constexpr double near_px2 = 8.0 * 8.0;  // three noisy rays locate the others so well
+  std::vector<PlacedObservation> seen;
+  std::vector<Eigen::Vector3d> rays_in_cam;
+  for (const PlacedObservation& each : observations) {
+    const auto ray = unproject(camera, each.px);
+    if (!ray) continue;
+    seen.push_back(each);
+    rays_in_cam.push_back(*ray);
+  }
+  if (seen.size() < 3) return {};
+  std::mt19937_64 bits(1);
+  std::vector<std::pair<double, Rigid3>> scored;
+  for (int draw = 0; draw < num_draws; ++draw) {
+    const std::size_t a = bits() % seen.size(), b = bits() % seen.size(), c = bits() % seen.size();
+    if (a == b || b == c || a == c) continue;
+    for (const Rigid3& pose :
+         three_point_poses({seen[a].point_in_world, seen[b].point_in_world, seen[c].point_in_world},
+                           {rays_in_cam[a], rays_in_cam[b], rays_in_cam[c]})) {
+      double score = 0.0;
+      for (const PlacedObservation& each : seen) {
+        const auto px = project(camera, pose.inverse() * each.point_in_world);
+        if (px) score += 1.0 / (1.0 + (*px - each.px).squaredNorm() / near_px2);
+      }
+      scored.emplace_back(score, pose);
+    }
+  }
+  std::ranges::stable_sort(scored, std::greater{}, [](const auto& each) { return each.first; });
+  std::vector<Rigid3> poses;
+  for (std::size_t i = 0; i < std::min(scored.size(), max_poses); ++i) poses.push_back(scored[i].second);
+  return poses;
 }
 
 }  // namespace alidade

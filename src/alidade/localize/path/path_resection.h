@@ -24,10 +24,16 @@ struct CameraResection {
   std::vector<bool> fits;  ///< One per observation.
 };
 
-/// From each of the poses to begin at, weights that fall with a residual (Geman & McClure 1985), wide at first, then
-/// narrower; the one that explains most. None: fewer than three observations, or nothing to begin at.
+/// From each of the poses to begin at, weights that fall with a residual (Geman & McClure 1985), as wide as `widest_px`
+/// at first, then narrower; the one that explains most. None: fewer than three observations, or nothing to begin at.
 [[nodiscard]] std::optional<CameraResection> resection(const Camera& camera,
                                                        std::span<const PlacedObservation> observations,
-                                                       std::span<const Rigid3> begin_at, double gate);
+                                                       std::span<const Rigid3> begin_at, double gate,
+                                                       double widest_px = 64.0);
+
+/// Poses from drawn sets of three observations, those that explain most first (M. A. Fischler & R. C. Bolles, "Random
+/// Sample Consensus", 1981).
+[[nodiscard]] std::vector<Rigid3> poses_of_threes(const Camera& camera, std::span<const PlacedObservation> observations,
+                                                  int num_draws, std::size_t max_poses);
 
 }  // namespace alidade

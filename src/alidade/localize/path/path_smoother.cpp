@@ -325,6 +325,7 @@ SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
     spread.J[k] = to_camera * spread.J[k];
   }
   fill_map(spread.point_cov, path);
+  fill_frame(system, considered, spread, path);
   fill_lens(cov, path);
   const std::vector<int> given(lens_order_.begin() + num_estimated_, lens_order_.end());
   path.given = given_numbers(

@@ -101,8 +101,10 @@ struct SmoothedPath {
   std::vector<long> ids;                         ///< Of the points, growing.
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> point_covs;
-  std::vector<double> error_factors;  ///< Of the points.
-  double usual_variance = 1.0;        ///< The median of theirs, over the stated one.
+  SavedFrame frame;  ///< What the points' errors have in common, where the frame is a given one,
+  std::vector<Eigen::Matrix3d> covs_in_map;  ///< and what of them is beside it.
+  std::vector<double> error_factors;         ///< Of the points.
+  double usual_variance = 1.0;               ///< The median of theirs, over the stated one.
   Camera camera;
   bool is_lens_freed = false;
   std::vector<int> estimated;  ///< Of the lens's parameters,

@@ -154,6 +154,9 @@ class PathSmoother {
   void add_clock(SmoothedPath& path) const;
   /// path_gauge.cpp.
   void align(const SmootherSystem& system, const Eigen::MatrixXd& considered, PoseChain::Spread& spread) const;
+  void fill_frame(const SmootherSystem& system, const Eigen::MatrixXd& considered, const PoseChain::Spread& spread,
+                  SmoothedPath& path) const;
+  void widen_frame(std::span<const Eigen::Vector3d> moves, double more, SmoothedPath& path) const;
   /// path_profile.cpp.
   void widen(double min_cost, SmoothedPath& path);
   [[nodiscard]] bool fix_weakest(const SmoothedPath& path);

@@ -169,8 +169,8 @@ PoseChain::Steps PoseChain::steps(const Eigen::VectorXd& shared) const {
 
 /// What is left of right-hand sides as poses and points leave, in the order in which they did: y of each step, and of
 /// the border what belongs to the shared parameters.
-std::vector<Eigen::MatrixXd> PoseChain::forward(const std::vector<Eigen::MatrixXd>& W, Eigen::MatrixXd& border) const {
-  const Eigen::Index num_columns = W.front().cols();
+std::vector<Eigen::MatrixXd> PoseChain::forward(const Columns& W, Eigen::MatrixXd& border) const {
+  const Eigen::Index num_columns = W.poses.front().cols();
   border = Eigen::MatrixXd::Zero(B.rows(), num_columns);
   Eigen::MatrixXd poses = Eigen::MatrixXd::Zero(rest_dim, num_columns);  // of the window, but its first
   Eigen::MatrixXd first = Eigen::MatrixXd::Zero(pose_dim, num_columns);
@@ -179,11 +179,12 @@ std::vector<Eigen::MatrixXd> PoseChain::forward(const std::vector<Eigen::MatrixX
     y.emplace_back();
     if (step.event == Event::entered) continue;
     if (step.event == Event::pose) {
-      first = poses.topRows<pose_dim>() + W[step.index];
+      first = poses.topRows<pose_dim>() + W.poses[step.index];
       poses.topRows<pose_dim>() = poses.bottomRows<pose_dim>().eval();
       poses.bottomRows<pose_dim>().setZero();
     } else {
       first = border.middleRows<3>(step.place);
+      if (!W.points.empty()) first += W.points[step.index];
       border.middleRows<3>(step.place).setZero();
     }
     y.back() = step.L.triangularView<Eigen::Lower>().solve(first);
@@ -193,10 +194,10 @@ std::vector<Eigen::MatrixXd> PoseChain::forward(const std::vector<Eigen::MatrixX
   return y;
 }
 
-PoseChain::Columns PoseChain::solve(const std::vector<Eigen::MatrixXd>& W, int num_solved) const {
+PoseChain::Columns PoseChain::solve(const Columns& W, int num_solved) const {
   Eigen::MatrixXd border;
   const std::vector<Eigen::MatrixXd> y = forward(W, border);
-  const Eigen::Index num_columns = W.front().cols();
+  const Eigen::Index num_columns = W.poses.front().cols();
   Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(B.rows(), num_columns);
   if (num_solved > 0) {
     shared.topRows(num_solved) = Llt(B.topLeftCorner(num_solved, num_solved)).solve_each(border.topRows(num_solved));

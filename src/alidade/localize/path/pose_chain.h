@@ -58,12 +58,12 @@ class PoseChain {
   };
   [[nodiscard]] Spread spread(const Eigen::MatrixXd& shared_cov, const Eigen::MatrixXd& J_shared) const;
 
-  /// Σ W: the covariance of all poses and points with sums over the poses, W having six rows for each; the first
-  /// `num_solved` of the shared parameters are solved for, too, the others fixed.
+  /// Σ W: the covariance of all poses and points with sums over the poses, W having six rows for each, and the points
+  /// (three rows; empty: none); the first `num_solved` of the shared parameters are solved for, too, the others fixed.
   struct Columns {
     std::vector<Eigen::MatrixXd> poses, points;
   };
-  [[nodiscard]] Columns solve(const std::vector<Eigen::MatrixXd>& W, int num_solved) const;
+  [[nodiscard]] Columns solve(const Columns& W, int num_solved) const;
 
  private:
   static constexpr int rest_dim = window - pose_dim;
@@ -81,8 +81,7 @@ class PoseChain {
   struct Backward;
   void take_out(const Step& step);
   void take_from_border(const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>& W);
-  [[nodiscard]] std::vector<Eigen::MatrixXd> forward(const std::vector<Eigen::MatrixXd>& W,
-                                                     Eigen::MatrixXd& border) const;
+  [[nodiscard]] std::vector<Eigen::MatrixXd> forward(const Columns& W, Eigen::MatrixXd& border) const;
 
   int num_shared_ = 0, num_used_ = 0;  ///< Of the border.
   std::size_t num_poses_ = 0;

@@ -1,0 +1,172 @@
+#include "alidade/localize/map/moved_points.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+#include <unordered_map>
+
+#include "alidade/localize/frames/known_map.h"
+#include "alidade/localize/path/path_resection.h"
+
+// A filter that begins in a map whose half has moved takes a pose between both halves, or the one that it saw first: it
+// gates by what it expects. Poses of single frames owe nothing to each other.
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t least_seen = 8, least_of_frame = 12;
+
+/// What of a map one frame shows, and sets of points of which each fits a pose: that of most, and of the rest.
+struct Sighting {
+  std::vector<long> ids;
+  std::vector<std::vector<bool>> fits;
+};
+
+using SavedById = std::unordered_map<long, const SavedPoint*>;
+
+/// The pose that most fit. None: fewer than a few do.
+std::optional<CameraResection> pose_of_most(const Camera& camera, std::span<const PlacedObservation> some,
+                                            std::span<const PlacedObservation> all) {
+  constexpr int num_draws = 150;  // of halves an eighth of them are of one
+  constexpr std::size_t max_poses = 12;
+  constexpr double gate = 13.8, near_px = 6.0;
+  if (some.size() < least_seen) return std::nullopt;
+  std::optional<CameraResection> best;
+  for (const Rigid3& pose : poses_of_threes(camera, some, num_draws, max_poses)) {
+    const std::array<Rigid3, 1> from{pose};
+    auto there = resection(camera, some, from, gate, near_px);
+    if (there && there->num_fit >= least_seen && (!best || there->cost < best->cost)) best = std::move(there);
+  }
+  if (!best) return std::nullopt;
+  const std::array<Rigid3, 1> from{best->world_from_cam};
+  return resection(camera, all, from, gate, near_px);
+}
+
+Sighting sighting_of(const Camera& camera, const ObservationFrame& frame, const SavedById& map, double sigma_px) {
+  constexpr int most_parts = 2;
+  Sighting sighting;
+  std::vector<PlacedObservation> placed;
+  for (const FeatureObservation& each : frame.observations) {
+    const auto at = map.find(each.id);
+    if (at == map.end()) continue;
+    sighting.ids.push_back(each.id);
+    placed.push_back({each.px, std::max(sigma_px, each.sigma_px), at->second->point_in_world, at->second->cov});
+  }
+  std::vector<bool> is_placed(placed.size(), false);
+  for (int part = 0; part < most_parts; ++part) {
+    std::vector<PlacedObservation> rest;
+    for (std::size_t i = 0; i < placed.size(); ++i)
+      if (!is_placed[i]) rest.push_back(placed[i]);
+    auto found = pose_of_most(camera, rest, placed);
+    if (!found || found->num_fit < least_seen) break;
+    for (std::size_t i = 0; i < placed.size(); ++i) is_placed[i] = is_placed[i] || found->fits[i];
+    sighting.fits.push_back(std::move(found->fits));
+  }
+  return sighting;
+}
+
+/// The frames to look at, spread over those that show enough of the map.
+std::vector<const ObservationFrame*> frames_to_judge(std::span<const ObservationFrame> frames, const SavedById& map) {
+  constexpr std::size_t most = 24;
+  std::vector<const ObservationFrame*> enough;
+  for (const ObservationFrame& frame : frames) {
+    const auto num = std::ranges::count_if(frame.observations, [&](const auto& each) { return map.contains(each.id); });
+    if (static_cast<std::size_t>(num) >= least_of_frame) enough.push_back(&frame);
+  }
+  std::vector<const ObservationFrame*> chosen;
+  const std::size_t num = std::min(most, enough.size());
+  for (std::size_t i = 0; i < num; ++i) chosen.push_back(enough[i * enough.size() / num]);
+  return chosen;
+}
+
+/// In how many frames a point was seen, and in how many it fitted.
+struct Votes {
+  std::map<long, std::pair<std::size_t, std::size_t>> of_point;
+
+  void add(const Sighting& sighting, const std::vector<bool>& fits) {
+    for (std::size_t i = 0; i < sighting.ids.size(); ++i) {
+      auto& [num_fit, num_seen] = of_point[sighting.ids[i]];
+      num_fit += fits[i] ? 1 : 0;
+      ++num_seen;
+    }
+  }
+  /// How well a set agrees with what was found so far.
+  [[nodiscard]] double agreement(const Sighting& sighting, const std::vector<bool>& fits) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < sighting.ids.size(); ++i) {
+      const auto at = of_point.find(sighting.ids[i]);
+      if (at == of_point.end()) continue;
+      const double share = static_cast<double>(at->second.first) / static_cast<double>(at->second.second);
+      sum += (fits[i] ? 1.0 : -1.0) * (share - 0.5);
+    }
+    return sum;
+  }
+};
+
+/// The sets that agree with the largest of all, frame by frame from there on, and back.
+Votes votes_of(std::span<const Sighting> sightings) {
+  const auto largest = std::ranges::max_element(
+      sightings, {}, [](const Sighting& each) { return std::ranges::count(each.fits.front(), true); });
+  Votes votes;
+  votes.add(*largest, largest->fits.front());
+  const auto add = [&](const Sighting& each) {
+    const auto agreeing = std::ranges::max_element(
+        each.fits, {}, [&](const std::vector<bool>& fits) { return votes.agreement(each, fits); });
+    if (votes.agreement(each, *agreeing) > 0.0) votes.add(each, *agreeing);
+  };
+  std::for_each(largest + 1, sightings.end(), add);
+  std::for_each(std::make_reverse_iterator(largest), sightings.rend(), add);
+  return votes;
+}
+
+/// Of points that have moved, so many as one pose fits in the middle one of the frames.
+std::size_t num_as_one(std::span<const Sighting> sightings, const std::set<long>& moved) {
+  std::vector<std::size_t> nums;
+  for (const Sighting& each : sightings) {
+    std::size_t most = 0;
+    for (const std::vector<bool>& fits : each.fits) {
+      std::size_t num = 0;
+      for (std::size_t i = 0; i < fits.size(); ++i) num += fits[i] && moved.contains(each.ids[i]) ? 1 : 0;
+      most = std::max(most, num);
+    }
+    nums.push_back(most);
+  }
+  const auto middle = nums.begin() + static_cast<std::ptrdiff_t>(nums.size() / 2);
+  std::ranges::nth_element(nums, middle);
+  return *middle;
+}
+
+}  // namespace
+
+MovedMapPoints moved_map_points(const Camera& camera, std::span<const ObservationFrame> frames, const SavedMap& map,
+                                double sigma_px) {
+  constexpr std::size_t enough_frames = 3;
+  SavedById by_id;
+  for (const KnownPoint& known : known_points(map))
+    by_id[known.id] = &*std::ranges::find(map.points, known.id, &SavedPoint::id);
+  std::vector<Sighting> sightings;
+  for (const ObservationFrame* frame : frames_to_judge(frames, by_id))
+    sightings.push_back(sighting_of(camera, *frame, by_id, sigma_px));
+  std::erase_if(sightings, [](const Sighting& each) { return each.fits.empty(); });
+  MovedMapPoints moved;
+  if (sightings.size() < enough_frames) return moved;
+  std::set<long> ids;
+  std::size_t num_still = 0;
+  for (const auto& [id, votes] : votes_of(sightings).of_point) {
+    const auto& [num_fit, num_seen] = votes;
+    if (num_seen < enough_frames) continue;
+    ++moved.num_judged;
+    if (3 * num_fit < num_seen)
+      ids.insert(id);
+    else
+      ++num_still;
+  }
+  if (num_still < least_seen || 5 * num_still < moved.num_judged || ids.empty()) return moved;
+  moved.ids.assign(ids.begin(), ids.end());
+  for (const long id : moved.ids) moved.places.push_back(by_id.at(id)->point_in_world);
+  moved.num_as_one = num_as_one(sightings, ids);
+  return moved;
+}
+
+}  // namespace alidade

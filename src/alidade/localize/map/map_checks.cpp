@@ -7,6 +7,11 @@
 namespace alidade {
 namespace {
 
+std::string distance_text(double distance_m) {
+  constexpr double long_m = 0.1;
+  return distance_m < long_m ? text_of(1000.0 * distance_m, 2) + " mm" : text_of(distance_m, 2) + " m";
+}
+
 /// Few do no harm without their old positions. Where a part that moved as one is nearly as large as the one that
 /// stayed, nothing says which of both did.
 void add_moved(const MovedPoints& moved, Verdict& verdict) {
@@ -17,7 +22,7 @@ void add_moved(const MovedPoints& moved, Verdict& verdict) {
   const double part = share(moved.num, moved.num_judged);
   std::string text = std::to_string(moved.num) + " of the map's " + std::to_string(moved.num_judged) +
                      " points that are seen have moved since it was made";
-  if (moved.median_m > 0.0) text += ", by " + text_of(1000.0 * moved.median_m, 2) + " mm (their median)";
+  if (moved.median_m > 0.0) text += ", by " + distance_text(moved.median_m) + " (their median)";
   text += moved.is_left_out ? ": they are new points, and the path is by the others"
                             : ": a recording of so many frames is not solved again without them";
   if (is_either)

@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_seen = 8, least_of_frame = 12;
+constexpr std::size_t least_seen = 8, least_of_frame = 12, enough_frames = 3;
 
 /// What of a map one frame shows, and sets of points of which each fits a pose: that of most, and of the rest.
 struct Sighting {
@@ -120,52 +120,61 @@ Votes votes_of(std::span<const Sighting> sightings) {
   return votes;
 }
 
-/// Of points that have moved, so many as one pose fits in the middle one of the frames.
-std::size_t num_as_one(std::span<const Sighting> sightings, const std::set<long>& moved) {
+std::vector<Sighting> sightings_of(const Camera& camera, std::span<const ObservationFrame> frames, const SavedById& map,
+                                   double sigma_px) {
+  std::vector<Sighting> sightings;
+  for (const ObservationFrame* frame : frames_to_judge(frames, map))
+    sightings.push_back(sighting_of(camera, *frame, map, sigma_px));
+  std::erase_if(sightings, [](const Sighting& each) { return each.fits.empty(); });
+  return sightings;
+}
+
+/// So many of some points as one pose fits in the middle one of the frames.
+std::size_t num_as_one(std::span<const Sighting> sightings) {
+  if (sightings.empty()) return 0;
   std::vector<std::size_t> nums;
-  for (const Sighting& each : sightings) {
-    std::size_t most = 0;
-    for (const std::vector<bool>& fits : each.fits) {
-      std::size_t num = 0;
-      for (std::size_t i = 0; i < fits.size(); ++i) num += fits[i] && moved.contains(each.ids[i]) ? 1 : 0;
-      most = std::max(most, num);
-    }
-    nums.push_back(most);
-  }
+  for (const Sighting& each : sightings)
+    nums.push_back(static_cast<std::size_t>(std::ranges::count(each.fits.front(), true)));
   const auto middle = nums.begin() + static_cast<std::ptrdiff_t>(nums.size() / 2);
   std::ranges::nth_element(nums, middle);
   return *middle;
+}
+
+/// Those that fit in fewer than a third of their frames. `num_judged`: of how many.
+std::set<long> misfits_of(std::span<const Sighting> sightings, std::size_t& num_judged) {
+  std::set<long> ids;
+  num_judged = 0;
+  if (sightings.size() < enough_frames) return ids;
+  for (const auto& [id, votes] : votes_of(sightings).of_point) {
+    const auto& [num_fit, num_seen] = votes;
+    if (num_seen < enough_frames) continue;
+    ++num_judged;
+    if (3 * num_fit < num_seen) ids.insert(id);
+  }
+  return ids;
 }
 
 }  // namespace
 
 MovedMapPoints moved_map_points(const Camera& camera, std::span<const ObservationFrame> frames, const SavedMap& map,
                                 double sigma_px) {
-  constexpr std::size_t enough_frames = 3;
-  SavedById by_id;
+  constexpr int most_rounds = 5;  // a pose between two parts that are little apart fits many of both
+  SavedById still, gone;
   for (const KnownPoint& known : known_points(map))
-    by_id[known.id] = &*std::ranges::find(map.points, known.id, &SavedPoint::id);
-  std::vector<Sighting> sightings;
-  for (const ObservationFrame* frame : frames_to_judge(frames, by_id))
-    sightings.push_back(sighting_of(camera, *frame, by_id, sigma_px));
-  std::erase_if(sightings, [](const Sighting& each) { return each.fits.empty(); });
+    still[known.id] = &*std::ranges::find(map.points, known.id, &SavedPoint::id);
   MovedMapPoints moved;
-  if (sightings.size() < enough_frames) return moved;
-  std::set<long> ids;
-  std::size_t num_still = 0;
-  for (const auto& [id, votes] : votes_of(sightings).of_point) {
-    const auto& [num_fit, num_seen] = votes;
-    if (num_seen < enough_frames) continue;
-    ++moved.num_judged;
-    if (3 * num_fit < num_seen)
-      ids.insert(id);
-    else
-      ++num_still;
+  for (int round = 0; round < most_rounds; ++round) {
+    std::size_t num_judged = 0;
+    const std::set<long> misfits = misfits_of(sightings_of(camera, frames, still, sigma_px), num_judged);
+    if (round == 0) moved.num_judged = num_judged;
+    const std::size_t num_fit = num_judged - misfits.size();
+    if (misfits.empty() || num_fit < least_seen || 5 * num_fit < moved.num_judged) break;
+    for (const long id : misfits) gone.insert(still.extract(id));
   }
-  if (num_still < least_seen || 5 * num_still < moved.num_judged || ids.empty()) return moved;
-  moved.ids.assign(ids.begin(), ids.end());
-  for (const long id : moved.ids) moved.places.push_back(by_id.at(id)->point_in_world);
-  moved.num_as_one = num_as_one(sightings, ids);
+  for (const auto& [id, point] : gone) moved.ids.push_back(id);
+  std::ranges::sort(moved.ids);
+  for (const long id : moved.ids) moved.places.push_back(gone.at(id)->point_in_world);
+  moved.num_as_one = num_as_one(sightings_of(camera, frames, gone, sigma_px));
   return moved;
 }
 

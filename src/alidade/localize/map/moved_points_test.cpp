@@ -101,6 +101,22 @@ TEST(MovedMapPoints, AreLeftOutAndNamed) {
   }
 }
 
+/// A part that moved little as one is found to its last point.
+TEST(MovedMapPoints, AreFoundWhereAPoseBetweenBothPartsFitsManyOfBoth) {
+  const TwoVisits visits = two_visits(6, "moved_little_test");
+  SavedMap map = visits.map;
+  std::size_t num = 0;
+  for (SavedPoint& point : map.points) {
+    if (point.id % 3 != 0) continue;
+    point.point_in_world += Eigen::Vector3d(0.012, -0.008, 0.0);
+    ++num;
+  }
+  const Localization result = in_map(visits, map);
+  EXPECT_GE(result.moved_points.num + 1, num) << result.verdict.sentence;
+  EXPECT_LE(result.moved_points.num, num + 1) << result.verdict.sentence;
+  EXPECT_LT(mean_nees(visits, result), 4.0) << result.verdict.sentence;
+}
+
 /// Of a half that moved as one the other one cannot be told.
 TEST(MovedMapPoints, AreNotToldFromThoseThatStayedWhereTheyAreAsMany) {
   const TwoVisits visits = two_visits(4, "moved_half_test");

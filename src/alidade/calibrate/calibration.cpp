@@ -8,6 +8,7 @@
 
 #include "alidade/calibrate/changes/lens_change.h"
 #include "alidade/calibrate/changes/photo_effects.h"
+#include "alidade/calibrate/changes/rolling_shutter.h"
 #include "alidade/calibrate/changes/two_lenses.h"
 #include "alidade/calibrate/checks/assumed.h"
 #include "alidade/calibrate/checks/better_model.h"
@@ -134,9 +135,12 @@ void explain_disagreement(std::span<const ViewScore> scores, bool changes, Calib
 /// Why photos disagree, by a change over them or without one.
 void heed_changes(LensChangeStudy change, const std::vector<ViewScore>& scores, const OrderTaken& taken,
                   Calibration& result) {
-  const std::optional<PhotoEffect> effect = effect_beside(change, scores, taken, result);
-  if (effect) change.change.reset();
+  const bool is_explained = result.verdict.state == State::good || has_a_cause(result);
+  const auto motion = is_explained ? std::nullopt : readout_motion(result.board_views, result);
+  const std::optional<PhotoEffect> effect = motion ? std::nullopt : effect_beside(change, scores, taken, result);
+  if (effect || motion) change.change.reset();
   heed_change(change, taken.photos, result.verdict);
+  if (motion) return heed_readout_motion(*motion, result.verdict);
   if (effect) return heed_photo_effect(*effect, result.verdict);
   if (result.verdict.state == State::good) return;
   const bool changes = std::ranges::any_of(result.verdict.checks, [](const Check& check) {

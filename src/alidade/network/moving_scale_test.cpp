@@ -28,7 +28,7 @@ struct TrueMatch {
 
 /// A minute of a path in a unit of its own, and a receiver's track of it: 5 mm of noise, and an error that varies
 /// slowly.
-PathMatch matched(const TrueMatch& world, testing::PathOf path, double slow_m, unsigned seed) {
+PathMatch matched(const TrueMatch& world, testing::PathOf path, double slow_m, unsigned seed, double row_s = 0.2) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise;
   std::uniform_real_distribution<double> phase(0.0, 6.28);
@@ -42,7 +42,7 @@ PathMatch matched(const TrueMatch& world, testing::PathOf path, double slow_m, u
   }
   const Eigen::Vector3d phases(phase(random), phase(random), phase(random));
   TrueTrack truth;
-  for (double t = -3.0; t < 63.0; t += 0.2) {
+  for (double t = -3.0; t < 63.0; t += row_s) {
     truth.t_s.push_back(world.offset_s + world.rate * t);
     const Eigen::Vector3d slow = slow_m * (phases.array() + t / 7.0).sin();
     truth.position.emplace_back(to_truth.b_from_a.rotation * path(t) + to_truth.b_from_a.translation + slow +
@@ -95,6 +95,18 @@ TEST(PathMatch, ACircleSaysThatItsTurnAndItsClockAreOne) {
       return std::sqrt(about.dot(match.cov.block<3, 3>(3, 3) * about));
     };
     EXPECT_GT(sigma(axis), 10.0 * sigma(across));
+  }
+}
+
+/// Positions once a second were joined by straight lines: the path was too small by what lies inside of its bends.
+TEST(PathMatch, BetweenRowsThatAreASecondApartThePathIsACurve) {
+  const TrueMatch world;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const PathMatch match = matched(world, testing::loops, 0.0, seed, 1.0);
+    const Vector9d error = error_of(match, world);
+    for (Eigen::Index k = 0; k < 9; ++k)
+      EXPECT_LT(std::abs(error[k]), 5.0 * std::sqrt(match.cov(k, k))) << seed << ' ' << k;
+    EXPECT_LT(std::abs(error[6]), 1e-3) << seed;
   }
 }
 

@@ -42,7 +42,8 @@ struct TrueTrack {
   std::vector<double> t_s;
   std::vector<Eigen::Vector3d> position;
 
-  /// Linear interpolation. None before the first time and after the last.
+  /// By the cubic through two positions before and two after, of which none is twice as far as another; else linear.
+  /// None before the first time and after the last.
   [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const;
 };
 

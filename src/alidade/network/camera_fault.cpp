@@ -39,7 +39,7 @@ Agreement agreement_of(const MovingTargetReport& report) {
     ++agreement.num_placed;
     sum2 += camera.sigma_px * camera.sigma_px;
   }
-  for (const LensScore& lens : report.lenses) agreement.lens_sigmas = std::max(agreement.lens_sigmas, lens.sigmas());
+  for (const CameraScore& lens : report.scores) agreement.lens_sigmas = std::max(agreement.lens_sigmas, lens.sigmas());
   agreement.flatness = flatness_of(report.path);
   if (agreement.num_placed > 0) agreement.sigma_px = std::sqrt(sum2 / static_cast<double>(agreement.num_placed));
   return agreement;
@@ -120,16 +120,17 @@ Best best_undone(const std::vector<TargetObservation>& observations, const std::
     std::swap(exchanged[a].camera, exchanged[b].camera);
     const Agreement agreement = agreement_of(place(observations, exchanged, clock_search_s));
     // One wrong file may fit another head better, and is as wrong there.
-    if (agreement.lens_sigmas > lens_limit) continue;
+    if (agreement.lens_sigmas > camera_limit) continue;
     best.consider(agreement, "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
   }
   return best;
 }
 
-/// One camera whose clock is another: the reference's if all others differ from it alike.
+/// Cameras whose clocks differ: of three or more the one that is another, the reference if all others differ from it
+/// alike.
 void consider_clocks(const std::vector<TargetObservation>& observations, const std::vector<RigHead>& given,
                      const PlaceCameras& place, Best& best) {
-  constexpr double search_s = 1.0, min_sigmas = 5.0, same_s = 0.015;
+  constexpr double search_s = 1.0, min_sigmas = 5.0, same_s = 0.003;
   const MovingTargetReport report = place(observations, given, search_s);
   const Agreement agreement = agreement_of(report);
   std::vector<std::size_t> other;
@@ -143,11 +144,12 @@ void consider_clocks(const std::vector<TargetObservation>& observations, const s
   for (std::size_t h = 0; h < late_s.size(); ++h)
     if (std::abs(late_s[h] - usual_s) > std::max(same_s, min_sigmas * report.cameras[h].sigma_clock_s))
       other.push_back(h);
-  if (other.size() != 1 || given.size() < 3) return;
+  if (other.size() != 1) return;
   const double by_s = late_s[other.front()] - usual_s;
-  best.consider(agreement, "the clock of head " + name_of(given[other.front()]) + " is " +
-                               text_of(1e3 * std::abs(by_s), 2) + " ms " + (by_s > 0.0 ? "ahead of" : "behind") +
-                               " the others'");
+  const std::string by = text_of(1e3 * std::abs(by_s), 2) + " ms";
+  best.consider(agreement, given.size() == 2 ? "the clocks of the two cameras differ by " + by
+                                             : "the clock of head " + name_of(given[other.front()]) + " is " + by +
+                                                   (by_s > 0.0 ? " ahead of" : " behind") + " the others'");
 }
 
 }  // namespace
@@ -194,14 +196,17 @@ std::string camera_fault_of(const MovingTargetReport& report, std::span<const Ta
     as_given = in_all;
   }
   Best best = best_undone(some, given, exchanges, doubtful, search_s, place);
-  if (doubtful && clock_search_s == 0.0) consider_clocks(some, given, place, best);
   // By as much less is left as no chance would have it: of thousands of observations a hundredth would be.
   // Where one was not located at all, the others may have agreed well: so must all now.
   constexpr double much_less = 0.93, about_as_little = 1.3;
   const bool all_were_placed = as_given.num_placed == given.size();
-  const bool explains = best.agreement.num_placed == given.size() &&
-                        best.agreement.sigma_px < (all_were_placed ? much_less : about_as_little) * as_given.sigma_px;
-  if (!explains) return "";
+  const auto explains = [&] {
+    return best.agreement.num_placed == given.size() &&
+           best.agreement.sigma_px < (all_were_placed ? much_less : about_as_little) * as_given.sigma_px;
+  };
+  // Clocks that differ are part of what an exchange or a mirror takes, too.
+  if (clock_search_s == 0.0 && (doubtful || explains())) consider_clocks(some, given, place, best);
+  if (!explains()) return "";
   return best.words + ": undone, all cameras agree to " + text_of(best.agreement.sigma_px, 2) + " px" +
          (as_given.num_placed == given.size() ? ", for " + text_of(as_given.sigma_px, 2) : std::string());
 }

@@ -79,7 +79,7 @@ void take_covariance(const MovingProblem& problem, const MovingGiven& given, con
   const double scale = match != nullptr ? match->truth_from_path.scale : 1.0;
   const double sigma_scale = match != nullptr ? match->sigma_scale() : 0.0;
   report.assumed = given.assumed;
-  report.lenses = given.lenses;
+  report.scores = given.scores;
   report.cov_model = of_heads(problem, cov_model, scale);
   report.sigma_scale = sigma_scale;
   const Eigen::MatrixXd of_cameras = of_heads(problem, given.cov, scale);

@@ -4,14 +4,15 @@
 #include <cmath>
 #include <string>
 
-#include "alidade/network/moving_lenses.h"
+#include "alidade/network/camera_scores.h"
 
 namespace alidade {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double usual_f = 0.003, usual_centre_px = 2.0, usual_k1 = 0.01, usual_distance = 0.005;
+constexpr double usual_f = 0.003, usual_centre_px = 2.0, usual_k1 = 0.01, usual_distance = 0.005, usual_time_s = 0.02,
+                 usual_turn_rad = 0.02;
 
 struct Given {
   Assumption what;
@@ -38,18 +39,32 @@ void add_lens(const RigHead& rig_head, const Eigen::MatrixXd& follows, std::vect
   if (has_cov) given.cov += follows * cov * follows.transpose();
 }
 
-/// A lens that the observations half ask to be another may be that.
-void carry_asked(const SolvedMoving& solved, const LensScore& lens, Eigen::MatrixXd& cov) {
+constexpr double ordinary_of(CameraPart part) {
+  switch (part) {
+    case CameraPart::focal:
+      return 1.0;
+    case CameraPart::k1:
+      return usual_k1;
+    case CameraPart::cx:
+    case CameraPart::cy:
+      return usual_centre_px;
+    case CameraPart::clock:
+    case CameraPart::shutter:
+    case CameraPart::shutter_from_top:
+      return usual_time_s;
+    default:
+      return usual_turn_rad;
+  }
+}
+
+/// A camera that the observations half ask to be another may be that.
+void carry_asked(const SolvedMoving& solved, const CameraScore& one, Eigen::MatrixXd& cov) {
   constexpr double hardly = 2.5;
-  const Camera& camera = solved.state.heads[lens.head].camera;
-  const auto at = lens_param_of(camera, lens.part);
+  const bool is_lens = one.part <= CameraPart::k1;
   // What they hardly determine they may ask for by chance, and far too much of it.
-  const double ordinary = lens.part == LensPart::focal ? 1.0 : lens.part == LensPart::k1 ? usual_k1 : usual_centre_px;
-  if (lens.sigmas() < hardly || !at || std::hypot(lens.sigma, lens.given) > ordinary) return;
-  const Eigen::MatrixXd& by_lens = solved.by_lens[lens.head];
-  const VectorXd moved = lens.part == LensPart::focal
-                             ? VectorXd(by_lens.leftCols(2) * (lens.asked * params(camera.lens).head(2)))
-                             : VectorXd(by_lens.col(*at) * lens.asked);
+  if (one.sigmas() < hardly || std::hypot(one.sigma, one.given) > ordinary_of(one.part)) return;
+  if (is_lens && !lens_param_of(solved.state.heads[one.head].camera, one.part)) return;
+  const VectorXd moved = one.asked * one.follows;
   cov += moved * moved.transpose();
 }
 
@@ -91,12 +106,12 @@ void set_moves(const MovingProblem& problem, const SolvedMoving& solved, const E
 }  // namespace
 
 MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved, const MovingTargetConfig& config) {
-  MovingGiven given{{}, solved.cov, solved.lenses};
+  MovingGiven given{{}, solved.cov, solved.scores};
   std::vector<Given> all;
   for (std::size_t h = 0; h < solved.state.heads.size(); ++h)
     if (problem.placed[h]) add_lens(solved.state.heads[h], solved.by_lens[h], all, given);
   if (config.distance) add_distance(problem, solved, *config.distance, all);
-  for (const LensScore& lens : given.lenses) carry_asked(solved, lens, given.cov);
+  for (const CameraScore& one : given.scores) carry_asked(solved, one, given.cov);
   for (Given& one : all) {
     set_moves(problem, solved, given.cov, one);
     given.assumed.push_back(std::move(one.what));

@@ -17,7 +17,7 @@ struct MovingGiven {
   /// Of the shared parameters: the solver's, lenses whose covariance is given, and focal lengths that the observations
   /// contradict, but not significantly.
   Eigen::MatrixXd cov;
-  std::vector<LensScore> lenses;
+  std::vector<CameraScore> scores;
 };
 [[nodiscard]] MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved,
                                        const MovingTargetConfig& config);

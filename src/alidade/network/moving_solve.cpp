@@ -7,8 +7,8 @@
 
 #include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
+#include "alidade/network/camera_scores.h"
 #include "alidade/network/moving_clusters.h"
-#include "alidade/network/moving_lenses.h"
 
 namespace alidade {
 namespace {
@@ -124,24 +124,24 @@ struct Solver {
     return system;
   }
 
-  /// The same at the solution, with what is tested of each placed head's lens behind the shared parameters.
-  [[nodiscard]] PathSystem system_with_lenses() const {
+  /// The same at the solution, with what is tested of each placed camera behind the shared parameters.
+  [[nodiscard]] PathSystem system_with_parts() const {
     std::vector<Eigen::Index> column(state.heads.size(), -1);
     Eigen::Index num = problem.num_common();
     for (std::size_t h = 0; h < column.size(); ++h)
-      if (problem.placed[h]) column[h] = std::exchange(num, num + num_lens_parts);
+      if (problem.placed[h]) column[h] = std::exchange(num, num + num_camera_parts);
     PathSystem system(state.path.control.size(), num);
     add_fixed(system);
     const std::vector<TurnedHead> turned = turned_heads(problem, state);
     for (std::size_t i = 0; i < problem.observations.size(); ++i) {
-      const SolvedObservation& observation = problem.observations[i];
-      const auto terms = used[i] ? observation_terms(problem, state, turned, observation) : std::nullopt;
+      const SolvedObservation& one = problem.observations[i];
+      const auto terms = used[i] ? observation_terms(problem, state, turned, one) : std::nullopt;
       if (!terms) continue;
-      const double by = 1.0 / sigma_px[observation.head];
+      const double by = 1.0 / sigma_px[one.head];
       Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2, num);
-      const Eigen::Index first = problem.first_param(observation.head);
+      const Eigen::Index first = problem.first_param(one.head);
       if (first >= 0) J.middleCols(first, terms->J_common.cols()) = by * terms->J_common;
-      J.middleCols<num_lens_parts>(column[observation.head]) = by * J_px_lens(state, turned, observation, terms->at);
+      J.middleCols<num_camera_parts>(column[one.head]) = by * J_px_parts(problem, state, turned, one, terms->at);
       system.add(terms->at.first, by * terms->J_path, by * terms->r, 0, J);
     }
     return system;
@@ -288,9 +288,9 @@ void finish(Solver& solver, SolvedMoving& solved) {
   solved.clusters = std::move(clusters.of_time);
   solved.block_s = clusters.block_s;
   solved.by_lens = std::move(clusters.by_lens);
-  PathSystem wide = solver.system_with_lenses();
+  PathSystem wide = solver.system_with_parts();
   (void)wide.solve(0.0);  // singular where a lens is not determined: of that each score says
-  solved.lenses = lens_scores(solver.problem, solved, wide);
+  solved.scores = camera_scores(solver.problem, solved, wide);
 }
 
 }  // namespace

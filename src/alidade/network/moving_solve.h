@@ -58,7 +58,7 @@ struct SolvedMoving {
   ClusterCovariance clusters;            ///< Blocks of time.
   double block_s = 0.0;                  ///< Length of one.
   std::vector<Eigen::MatrixXd> by_lens;  ///< One per head: how the shared parameters follow its lens's.
-  std::vector<LensScore> lenses;         ///< Without what the files give.
+  std::vector<CameraScore> scores;       ///< Without what the files give.
   double chi2_per_dof = 0.0;
   int iterations = 0;
   bool converged = false;

@@ -135,33 +135,56 @@ void put_worst_first(const MovingTargetReport& report, Verdict& verdict) {
                                                  worst / next, far_worse, "", ""});
 }
 
-std::string asked_text(const LensScore& lens) {
-  const std::string by = text_of(std::abs(lens.asked), 2);
-  switch (lens.part) {
-    case LensPart::focal:
-      return "a focal length " + text_of(100.0 * std::abs(lens.asked), 2) + " % " +
-             (lens.asked > 0.0 ? "longer" : "shorter") + " than its camera file's";
-    case LensPart::k1:
-      return "a distortion other than its camera file's, k1 by " + text_of(lens.asked, 2);
+std::string asked_text(const CameraScore& one) {
+  const std::string by = text_of(std::abs(one.asked), 2), ms = text_of(1e3 * std::abs(one.asked), 2) + " ms";
+  switch (one.part) {
+    case CameraPart::focal:
+      return "a focal length " + text_of(100.0 * std::abs(one.asked), 2) + " % " +
+             (one.asked > 0.0 ? "longer" : "shorter") + " than its camera file's";
+    case CameraPart::cx:
+      return "a principal point " + by + " px " + (one.asked > 0.0 ? "right" : "left") + " of its camera file's";
+    case CameraPart::cy:
+      return "a principal point " + by + " px " + (one.asked > 0.0 ? "below" : "above") + " its camera file's";
+    case CameraPart::k1:
+      return "a distortion other than its camera file's, k1 by " + text_of(one.asked, 2);
+    case CameraPart::clock:
+      return "a clock that is " + ms + (one.asked > 0.0 ? " ahead of" : " behind") + " the others'";
+    case CameraPart::shutter:
+    case CameraPart::shutter_from_top:
+      return "a shutter that takes " + ms + " from the " + (one.asked > 0.0 ? "top" : "bottom") + " row on";
     default:
-      return std::string("a principal point ") + by + " px " +
-             (lens.part == LensPart::cx ? lens.asked > 0.0 ? "right" : "left"
-              : lens.asked > 0.0        ? "below"
-                                        : "above") +
-             " of its camera file's";
+      return "an attitude that changes by about " + text_of(std::abs(one.asked) / degree, 2) +
+             "° over its observations";
   }
 }
 
-/// The lens that the observations contradict most.
-void add_lenses(const MovingTargetReport& report, Verdict& verdict) {
-  if (report.lenses.empty()) return;
-  const LensScore& most = *std::ranges::max_element(report.lenses, {}, &LensScore::rank);
-  const bool is_quiet = most.sigmas() < lens_limit;
-  const std::string text = is_quiet ? "no lens is asked to be another"
-                                    : "head " + std::to_string(report.cameras[most.head].id) +
-                                          ": the observations ask for " + asked_text(most) + ", by " +
-                                          text_of(most.sigmas(), 2) + "σ: is the file of this lens at this zoom?";
-  verdict.checks.push_back({"lenses", is_quiet ? State::good : State::care, text, most.sigmas(), lens_limit, "σ", ""});
+std::string asking_text(const MovingTargetReport& report, const CameraScore& one) {
+  const std::string by = ", by " + text_of(one.sigmas(), 2) + "σ: ",
+                    clocks = "give --clocks SECONDS, which estimates each camera's clock";
+  const auto num = std::ranges::count(report.cameras, true, &LocatedCamera::placed);
+  if (one.part == CameraPart::clock && num == 2)  // which of the two, nothing tells
+    return "the two cameras' clocks differ by " + text_of(1e3 * std::abs(one.asked), 2) + " ms" + by + clocks;
+  std::string text =
+      "head " + std::to_string(report.cameras[one.head].id) + ": the observations ask for " + asked_text(one) + by;
+  if (one.part <= CameraPart::k1) return text + "is the file of this lens at this zoom?";
+  if (one.part == CameraPart::clock) return text + clocks;
+  if (one.part <= CameraPart::shutter_from_top)
+    return text + "rows are exposed one after the other; give the time of the row that saw the target";
+  return text + "was it moved? give the table of the time before, or after";
+}
+
+/// What the observations contradict most: of all that they contradict, what leaves the least of the residuals.
+void add_scores(const MovingTargetReport& report, Verdict& verdict) {
+  if (report.scores.empty()) return;
+  const auto rank = [](const CameraScore& one) {
+    return std::pair(one.sigmas() >= camera_limit ? one.gain : 0.0, one.sigmas());
+  };
+  const CameraScore& most = *std::ranges::max_element(report.scores, {}, rank);
+  const bool is_quiet = most.sigmas() < camera_limit;
+  const std::string text = is_quiet ? "neither another lens, clock or shutter nor a move of a camera is indicated"
+                                    : asking_text(report, most);
+  verdict.checks.push_back(
+      {"causes", is_quiet ? State::good : State::care, text, most.sigmas(), camera_limit, "σ", ""});
 }
 
 /// A camera that was moved, by what was rejected: where it is holds for a part of the time.
@@ -241,7 +264,7 @@ void add_truth_clock(const MovingTargetReport& report, Verdict& verdict) {
 }  // namespace
 
 Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTargetConfig& config) {
-  if (report.camera_fault.starts_with("the clock of"))
+  if (report.camera_fault.starts_with("the clock"))
     return moving_refusal(report.camera_fault, "give --clocks SECONDS, which estimates each camera's clock");
   if (!report.camera_fault.empty())
     return moving_refusal(report.camera_fault,
@@ -251,11 +274,11 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
   Verdict verdict;
   add_precision(report, verdict);
   put_worst_first(report, verdict);  // what is wrong comes before what follows from it
-  Verdict lenses;
-  add_rejected(report, lenses);
-  add_lenses(report, lenses);
-  add_truth_clock(report, lenses);
-  verdict.checks.insert(verdict.checks.begin(), lenses.checks.begin(), lenses.checks.end());
+  Verdict causes;
+  add_rejected(report, causes);
+  add_scores(report, causes);
+  add_truth_clock(report, causes);
+  verdict.checks.insert(verdict.checks.begin(), causes.checks.begin(), causes.checks.end());
   add_cameras(report, verdict);
   add_truth(report, verdict);
   const auto first = [&](State state) {

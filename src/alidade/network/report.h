@@ -63,22 +63,25 @@ struct LocatedCamera {
   std::optional<SplitMoment> moved;              ///< By its clock.
 };
 
-/// What is tested of a lens.
-enum class LensPart { focal, cx, cy, k1 };
+/// What is tested of a camera: its lens, by how much its clock is ahead, how long its shutter takes from the top row to
+/// the bottom one (times being the middle row's, or the top one's), and a turn about its base's axes from the first
+/// observation to the last.
+enum class CameraPart { focal, cx, cy, k1, clock, shutter, shutter_from_top, turn_x, turn_y, turn_z };
 
-/// The change of a camera's lens that the observations indicate, all else estimated too: a score test.
-struct LensScore {
+/// The change of a camera that the observations indicate, all else estimated too: a score test.
+struct CameraScore {
   std::size_t head = 0;
-  LensPart part = LensPart::focal;
-  double asked = 0.0, sigma = 0.0;  ///< Of both focal lengths, relative, or px, or k1; errors over time go together.
-  double given = 0.0;               ///< σ that it has by errors of all files as these state them.
+  CameraPart part = CameraPart::focal;
+  double asked = 0.0,
+         sigma = 0.0;  ///< Of both focal lengths, relative, or px, k1, s, rad; errors over time go together.
+  double given = 0.0;  ///< σ that it has by errors of all files as these state them.
   [[nodiscard]] double sigmas() const { return std::abs(asked) / std::hypot(sigma, given); }
-  /// To compare by: another zoom is likelier than a bent lens.
-  [[nodiscard]] double rank() const { return sigmas() * (part == LensPart::focal ? 1.0 : 0.6); }
+  double gain = 0.0;        ///< What it takes of the residuals' squares [σ of an observation, squared].
+  Eigen::VectorXd follows;  ///< The solver's shared parameters for each unit asked.
 };
 
-/// Beyond so many σ a lens is reported as wrong, as a rig's causes are.
-constexpr double lens_limit = 4.2;
+/// Beyond so many σ a camera is reported as another, as a rig's causes are.
+constexpr double camera_limit = 4.2;
 
 struct MovingTargetReport {
   enum class Status {
@@ -103,7 +106,7 @@ struct MovingTargetReport {
   double block_s = 0.0;             ///< Length of a block.
   std::string camera_fault;         ///< What is wrong with a camera, where that is identified; empty: nothing.
   std::vector<Assumption> assumed;  ///< Lenses and the distance.
-  std::vector<LensScore> lenses;    ///< Of located cameras, what the observations determine.
+  std::vector<CameraScore> scores;  ///< Of located cameras, what the observations determine.
   double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
   double sigma_world_m = 0.0, sigma_world_rad = 0.0;        ///< The same in the true path's frame; 0 without one.
   /// With a true path: its clock (time of the rig by its own), and the residuals of the similarity, over the path.

@@ -38,6 +38,17 @@ struct Trial {
 [[nodiscard]] std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
                                                         std::span<const RigHead> heads, const FollowConfig& config);
 
+/// Two heads' numbers that are exchanged for a while: their rays meet there once each row is of the other head, and all
+/// observations fit then.
+[[nodiscard]] std::optional<Explanation> exchanged_rows(std::span<const TargetObservation> observations,
+                                                        std::span<const RigHead> heads, const FollowConfig& config);
+
+/// Readings of an axis that are whole steps apart, if these err by more than the encoder's σ says; the coarsest. The
+/// check of it, "encoder": its value is that σ [rad].
+[[nodiscard]] std::optional<Check> coarse_readings(std::span<const TargetObservation> observations,
+                                                   std::span<const RigHead> heads, const FollowConfig& config);
+[[nodiscard]] std::string coarse_readings_remedy(const Check& coarse);
+
 /// "the clock of head 2 seems 30 ms behind that of head 1 …"
 [[nodiscard]] std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads);
 

@@ -42,22 +42,6 @@ double exact_step(std::span<const double> times, double about_s) {
 
 std::string in_ms(double seconds) { return text_of(1e3 * seconds, 3) + " ms"; }
 
-/// What a step does to the target's position, medians over the track: how far it goes, and in σ.
-StepMove move_of(double step_s, const TrackReport& report) {
-  StepMove move{.step_s = step_s};
-  std::vector<double> moved, in_sigma;
-  for (std::size_t i = report.steps.size() / 10; i < report.steps.size(); ++i) {
-    const TrackStep& step = report.steps[i];
-    if (!step.has_belief || !step.accepted) continue;
-    const Eigen::Vector3d by = step_s * step.belief.x.segment<3>(3);
-    moved.push_back(by.norm());
-    in_sigma.push_back((by.array().abs() / step.belief.P.diagonal().head<3>().array().sqrt()).maxCoeff());
-  }
-  move.moved_m = median_of(moved);
-  move.moved_in_sigma = median_of(in_sigma);
-  return move;
-}
-
 long most_frequent(std::span<const long> intervals) {
   std::map<long, std::size_t> num;
   for (const long interval : intervals) ++num[interval];
@@ -140,11 +124,26 @@ double step_of_times(std::span<const TargetObservation> observations) {
   return 0.0;
 }
 
+StepMove move_by_time(double late_s, const TrackReport& report) {
+  StepMove move{.step_s = late_s};
+  std::vector<double> moved, in_sigma;
+  for (std::size_t i = report.steps.size() / 10; i < report.steps.size(); ++i) {
+    const TrackStep& step = report.steps[i];
+    if (!step.has_belief || !step.accepted) continue;
+    const Eigen::Vector3d by = late_s * step.belief.x.segment<3>(3);
+    moved.push_back(by.norm());
+    in_sigma.push_back((by.array().abs() / step.belief.P.diagonal().head<3>().array().sqrt()).maxCoeff());
+  }
+  move.moved_m = median_of(moved);
+  move.moved_in_sigma = median_of(in_sigma);
+  return move;
+}
+
 std::optional<StepMove> move_within_step(std::span<const TargetObservation> observations, const TrackReport& report) {
   constexpr double least_sigma = 0.5;
   const double step_s = step_of_times(observations);
   if (!(step_s > 0.0)) return std::nullopt;
-  const StepMove move = move_of(step_s, report);
+  const StepMove move = move_by_time(step_s, report);
   return move.moved_in_sigma > least_sigma ? std::optional(move) : std::nullopt;
 }
 
@@ -160,7 +159,7 @@ std::optional<RoundedTimes> rounded_times(std::span<const TargetObservation> obs
   for (const Eigen::MatrixXd& factor : config.tracker.errors.factor)
     if (factor.rows() > 0) counted_s = std::max(counted_s, factor.row(factor.rows() - 1).norm());
   if (!(step_s > std::sqrt(12.0) * counted_s)) return std::nullopt;
-  const StepMove move = move_of(0.5 * step_s, report);
+  const StepMove move = move_by_time(0.5 * step_s, report);
   return RoundedTimes{.step_s = step_s, .late_m = move.moved_m, .late_in_sigma = move.moved_in_sigma};
 }
 

@@ -29,6 +29,9 @@ struct StepMove {
 [[nodiscard]] std::optional<StepMove> move_within_step(std::span<const TargetObservation> observations,
                                                        const TrackReport& report);
 
+/// What it does to the target if the times of all heads are late by so much.
+[[nodiscard]] StepMove move_by_time(double late_s, const TrackReport& report);
+
 /// None where the times of no head show that they were rounded, or --sigma-clock counts it.
 [[nodiscard]] std::optional<RoundedTimes> rounded_times(std::span<const TargetObservation> observations,
                                                         const FollowConfig& config, const TrackReport& report);

@@ -137,6 +137,13 @@ TEST(TimeSteps, OfAllHeadsAreSaidToBeNotTested) {
   const Rounded exact(0.0437, 0.0321371, 0.0, 3);
   std::vector<Assumption> none;
   EXPECT_EQ(exact.row(none, 0.0), nullptr);
+  // Nor do observations show that all times are late alike.
+  for (const std::vector<Assumption>& rows : {assumed, none}) {
+    const auto late = std::ranges::find(rows, "times.late_alike", &Assumption::name);
+    ASSERT_NE(late, rows.end());
+    EXPECT_NE(late->moved.find("mm ("), std::string::npos) << late->moved;
+    EXPECT_TRUE(std::isnan(late->moves));
+  }
 }
 
 /// Images at 12 Hz lie between steps of 50 ms, of both heads alike: their times are 25 ms early on average.

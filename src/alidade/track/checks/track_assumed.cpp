@@ -235,6 +235,22 @@ std::optional<Assumption> times_not_tested(std::span<const TargetObservation> ob
   return row;
 }
 
+/// One row for times of all heads that are late alike: the target is where it was so much earlier, and nothing shows
+/// it.
+Assumption times_late_alike(const TrackReport& report, double sigma_clock_s) {
+  const StepMove move = move_by_time(ordinary_clock_s, report);
+  return {.name = "times.late_alike",
+          .value = 0.0,
+          .sigma = sigma_clock_s,
+          .ordinary = ordinary_clock_s,
+          .moves = std::nan(""),
+          .moved =
+              "whether the times of all heads are late alike no observations show: the target is where it was so "
+              "much earlier, by " +
+              text_of(1e3 * move.moved_m, 2) + " mm (" + text_of(move.moved_in_sigma, 2) + "σ) for each " +
+              text_of(1e3 * move.step_s, 2) + " ms"};
+}
+
 }  // namespace
 
 std::vector<HeadReading> readings_at(std::span<const TargetObservation> observations, std::size_t num_heads,
@@ -304,6 +320,7 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
   lister.assumed.push_back(std::move(motion));
   if (auto row = angles_before_images(observations, rig.heads, report)) lister.assumed.push_back(std::move(*row));
   if (auto row = times_not_tested(observations, report, given.sigma_clock_s)) lister.assumed.push_back(std::move(*row));
+  if (median.step != nullptr) lister.assumed.push_back(times_late_alike(report, given.sigma_clock_s));
   if (auto row = not_tested(observations, rig, config, report)) lister.assumed.push_back(std::move(*row));
   return std::move(lister.assumed);
 }

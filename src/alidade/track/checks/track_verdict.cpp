@@ -169,7 +169,7 @@ std::optional<Check> second_target(const TrackReport& report, std::span<const Ta
 /// What of the observations as a whole is not as stated.
 struct Causes {
   std::optional<Fault> mistake;
-  std::optional<Check> second, falls;
+  std::optional<Check> second, falls, coarse;
   std::optional<ClockShift> shift;
   std::optional<OtherObject> other;
   std::optional<VelocityJumps> jumps;
@@ -188,9 +188,12 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   Causes causes;
   const bool is_explained = is_explained_by_fault(report);
   if (report.num_starts > 0 && (is_doubtful(report) || report.num_restarts > 0 || report.jitter)) {
-    causes.mistake = mirrored_images(observations, heads, found, alike_per_head(report));
+    causes.mistake = exchanged_rows(observations, heads, found);
+    if (!causes.mistake) causes.mistake = mirrored_images(observations, heads, found, alike_per_head(report));
     if (causes.mistake) return causes;
   }
+  if (report.num_starts > 0) causes.coarse = coarse_readings(observations, heads, config);
+  if (causes.coarse) return causes;
   if (report.num_starts > 0 && !is_explained && report.frozen.empty() && is_doubtful(report))
     causes.other = other_object(observations, heads, config, report);
   if (causes.other) return causes;
@@ -258,6 +261,7 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
                  "give them in order of capture, or check t_capture_s of each head: their clocks may differ by that"};
   if (causes.other && !fits(report))
     return Fault{other_object_text(*causes.other, heads), other_object_remedy(*causes.other, heads)};
+  if (causes.coarse && !fits(report)) return Fault{causes.coarse->text, coarse_readings_remedy(*causes.coarse)};
   if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_rejected)) return causes.mistake;
   if (is_explained_by_fault(report) && !fits(report))
     return Fault{"only " + text_of(100.0 * used_share(report), 2) +
@@ -284,8 +288,8 @@ std::string sentence_of(const TrackReport& report, std::size_t num_given, const 
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
   // Beside what only says how bad it is, what it may come from.
-  constexpr std::array<std::string_view, 11> names{"frozen",  "other object",  "bounces", "jitter", "times", "clocks",
-                                                   "mistake", "second target", "falls",   "rig",    "lean"};
+  constexpr std::array<std::string_view, 12> names{"frozen", "encoder", "other object",  "bounces", "jitter", "times",
+                                                   "clocks", "mistake", "second target", "falls",   "rig",    "lean"};
   const auto cause = std::ranges::find_if(
       verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
   if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
@@ -342,7 +346,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   if (causes.other) add_other(*causes.other, heads, verdict);
   if (causes.jumps) verdict.checks.push_back(velocity_jumps_check(*causes.jumps));
   if (causes.jumps && causes.falls) verdict.checks.back().text += "; " + causes.falls->text;
-  if (report.jitter && !causes.mistake && !causes.jumps)
+  if (report.jitter && !causes.mistake && !causes.jumps && !causes.coarse)
     verdict.checks.push_back(check("jitter", State::care, jitter_text(*report.jitter, step_of_times(observations)),
                                    1e3 * report.jitter->sigma_s, 0.0, "ms"));
   add_clocks(report, causes, heads, verdict);
@@ -353,10 +357,13 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   add_white(report, heads, verdict);
   put_likelier_first(verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
+  if (verdict.state == State::good) causes.coarse.reset();
+  if (causes.coarse) verdict.checks.insert(verdict.checks.begin(), *causes.coarse);
   if (!alike_per_head(report).empty()) verdict.to_add = fault_remedy(report, heads);
   set_times_remedy(report, causes, verdict);
   set_frozen_remedy(report, heads, verdict);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
+  if (causes.coarse) verdict.to_add = coarse_readings_remedy(*causes.coarse);
   if (causes.mistake) verdict.to_add = causes.mistake->to_do;
   if (causes.other) verdict.to_add = other_object_remedy(*causes.other, heads);
   if (causes.jumps) verdict.to_add = velocity_jumps_remedy;

@@ -101,7 +101,7 @@ TEST(TrackAssumed, WhatIsExactMovesNothingAndWhatIsUnknownDoes) {
   EXPECT_EQ(assumed_check(exact).state, State::good);
   EXPECT_EQ(exact.size(), unknown.size());
   for (const Assumption& what : exact)
-    if (what.name.ends_with(".not_tested"))  // a sentence
+    if (what.name.ends_with(".not_tested") || what.name == "times.late_alike")  // a sentence
       EXPECT_TRUE(std::isnan(what.moves));
     else if (!what.name.starts_with("motion") && what.name != "angles (s)")
       EXPECT_EQ(what.moves, 0.0) << what.name;

@@ -98,11 +98,10 @@ std::string margin_text(const LoopAnalysis& analysis) {
   return analysis.crossover_rad_s > 0.0 ? ", phase margin " + text_of(analysis.phase_margin_deg) + " deg" : "";
 }
 
-/// The axes' limits make it a limit cycle.
+/// A limit cycle.
 std::string swing_text(const LoopCheck& loop) {
   return std::string(controller_name(loop.controller)) + " swings for good by " + text_of(loop.swing_px) +
-         " px RMS after a jump of the target, by the limits of rate and acceleration (" + text_of(loop.free_px) +
-         " px without them)";
+         " px RMS after a jump of the target, by " + loop.swings_by + " (" + text_of(loop.free_px) + " px without)";
 }
 
 const ServoComparison& best_of(const ServoStudy& study) {
@@ -120,7 +119,8 @@ void add_loop_checks(const ServoScenario& scenario, const ServoStudy& study, Ver
     const std::string name = "loop of " + std::string(controller_name(loop.controller));
     const double most = loop.delay_samples < 0 ? 0.995 : 0.98;  // one that was tried has a slow observer in it, too
     if (loop.swings())
-      add_check(verdict, name, false, swing_text(loop), loop.swing_px, loop.free_px, "px");
+      add_check(verdict, name, loop.swing_px <= scenario.specification_px && !loop.swings_by.starts_with("the limits"),
+                swing_text(loop), loop.swing_px, loop.free_px, "px");
     else
       add_check(verdict, name, loop.analysis.sampled_radius < most,
                 "spectral radius " + text_of(loop.analysis.sampled_radius, 4) + of_which(scenario, loop) +
@@ -277,9 +277,10 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   for (const ControllerKind kind : scenario.controllers) {
     LoopCheck worst = worst_loop_of(scenario, kind, largest);
     if (kind != ControllerKind::pi && largest > 1.0) worst.rest_px = zoomed_rest_px(scenario, kind);
-    if (worst.is_stable() && has_limits(scene)) {
+    if (worst.is_stable() && !is_linear(scene)) {
       const Swing swing = swing_after_a_jump(scenario, kind);
       if (swing.is_for_good()) worst.swing_px = swing.rms_px;
+      worst.swings_by = swing.cause;
       worst.free_px = swing.free_px;
     }
     loops.push_back(worst);

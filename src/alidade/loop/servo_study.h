@@ -24,12 +24,13 @@ struct LoopCheck {
   int delay_samples = 0;   ///< In whole periods; −1: the controller was tried, and `sampled_radius` alone is known.
   /// RMS about a target at rest, the lens at its longest, where the loop keeps to a shorter one; 0: not tried.
   double rest_px = 0.0;
-  /// RMS that is left long after the target has jumped by a quarter of the image and rests, where the limits of rate
-  /// and acceleration keep the loop from rest; 0: it comes to rest, or has no limits.
+  /// RMS about its mean that is left long after the target has jumped by a quarter of the image and rests, where limits
+  /// of rate and acceleration, dead band or backlash keep the loop from rest; 0: it comes to rest, or is linear.
   double swing_px = 0.0;
-  double free_px = 0.0;  ///< The same without those limits.
-  std::size_t head = 0;  ///< Of whose lens it is the loop: the one nearest to instability.
-  std::size_t axis = 0;  ///< Of which axis: 0 pan, 1 tilt.
+  double free_px = 0.0;        ///< The same without them.
+  std::string swings_by = {};  ///< Without which alone it rests, or all of them; empty: it rests.
+  std::size_t head = 0;        ///< Of whose lens it is the loop: the one nearest to instability.
+  std::size_t axis = 0;        ///< Of which axis: 0 pan, 1 tilt.
 
   [[nodiscard]] bool is_stable() const;
   [[nodiscard]] bool swings() const { return swing_px > 0.0; }

@@ -99,7 +99,7 @@ loops.*.
   bandwidth_rad_s   rad/s  of the sampled loop with its delays; null: the controller was tried
   phase_margin_deg  deg    of the sampled loop with its delays; below 0: unstable
   loop_gain         1      of the loop
-  swing_px          px     that the limits of rate and acceleration keep it swinging by for good after a jump; 0: it rests
+  swing_px          px     that limits of rate and acceleration, or backlash, keep it swinging by for good after a jump, about its mean; 0: it rests
 best              text  controller
 specification_px  px    asked for
 *                 any   of a part that was asked for

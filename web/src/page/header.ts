@@ -22,7 +22,9 @@ function countsOf(doc: Doc): string[] {
   else if (corners) parts.push(`${corners.thinned?.from ?? corners.rows} corners`);
   else if (dropped !== undefined && dropped > averaged && doc.command !== 'track' && !isThinned) parts.push(`${dropped - averaged} rejected`);  // of a track some only waited for its start
   if (averaged > 0) parts.push(`${averaged} averaged with the one before`);
-  if (doc.skipped.length > averaged && doc.command !== 'calibrate') parts.push(`${doc.skipped.length - averaged} skipped`);
+  const inPart = doc.command === 'rig' ? doc.skipped.filter((one) => /^corners? \d/.test(one.reason)).length : 0;  // the view is used
+  if (inPart > 0) parts.push(`corners of ${inPart} left out`);
+  if (doc.skipped.length > averaged + inPart && doc.command !== 'calibrate') parts.push(`${doc.skipped.length - averaged - inPart} skipped`);
   if (Number.isFinite(doc.estimate('rms_px')))
     parts.push(`RMS ${num(doc.estimate('rms_px'), 3)} px${doc.command === 'calibrate' ? ' per corner' : ''}`);
   if (doc.estimate('rms_range_m') > 0) parts.push(`ranges ${num(1e3 * doc.estimate('rms_range_m'), 3)} mm`);

@@ -19,7 +19,7 @@ export function provenance(doc: Doc): HTMLElement {
         el('thead', {}, el('tr', {}, ...['role', 'name', 'bytes', 'SHA-256'].map((name) => el('th', {}, name)))),
         el('tbody', {}, ...doc.inputs.map((input) => el('tr', {}, el('td', {class: 'word'}, input.role), el('td', {class: 'word'}, input.name),
           el('td', {}, num(input.bytes, 12)), el('td', {class: 'word mono'}, input.sha256))))))) : null,
-    doc.skipped.length > 0 ? el('details', {open: doc.skipped.length <= 6}, el('summary', {}, `${doc.skipped.length} skipped, and why`),
+    doc.skipped.length > 0 ? el('details', {open: doc.skipped.length <= 6}, el('summary', {}, `${doc.skipped.length} skipped or left out, and why`),
       el('ul', {}, ...doc.skipped.slice(0, 500).map((one) =>
         el('li', {}, el('b', {}, one.file + (one.line > 0 ? `:${one.line}` : '')), ' ' + one.reason)))) : null);
 }

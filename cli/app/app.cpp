@@ -18,6 +18,7 @@
 #include "cli/app/field_options.h"
 #include "cli/app/help_format.h"
 #include "cli/app/out_of_memory.h"
+#include "cli/app/standard_input.h"
 #include "cli/app/terminal.h"
 #include "cli/app/usage_fault.h"
 
@@ -217,7 +218,8 @@ int App::dispatch(int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
+    const bool asks_for_help = error.get_exit_code() == 0;  // or for the version
+    if (asks_for_help && !names_unknown_command(app)) return app.exit(error);
     throw UsageError(usage_fault(app, error));
   }
   Command& command = *chosen_command();
@@ -228,6 +230,7 @@ int App::dispatch(int argc, const char* const* argv) {
   if (command.app->count("--out") > 0) options.leaves_results = true;
   catch_interrupts();
   require_place(options);
+  keep_piped_files({argv + 1, argv + argc});
   const tbb::global_control limit = prepare_libraries(options.threads);
   Run run(command.spec.name, {argv, argv + argc}, options, state_->terminal->progress(!options.quiet && !options.json));
   if (command.spec.draws_random_numbers) run.document.seed = options.seed;

@@ -2,6 +2,8 @@
 
 #include <istream>
 #include <memory>
+#include <string_view>
+#include <vector>
 
 namespace alidade::cli {
 
@@ -15,5 +17,10 @@ class StandardInput : public std::istream {
   class Buffer;
   std::unique_ptr<Buffer> buffer_;
 };
+
+/// Files among the words of a command line that come by a pipe, as <(…) of a shell names them (/dev/fd/63), and
+/// /dev/stdin: kept in memory under the same name, since inputs are read more than once. Throws Interrupted, and
+/// InputError beyond 1 GiB.
+void keep_piped_files(const std::vector<std::string_view>& words);
 
 }  // namespace alidade::cli

@@ -140,6 +140,12 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
   return where(at) + error.what() + (is_missing ? in_help : "");
 }
 
+bool names_unknown_command(const CLI::App& app) {
+  if (subcommand_names(deepest(app)).empty()) return false;
+  const std::vector<std::string> words = app.remaining(true);
+  return std::ranges::any_of(words, [](const std::string& word) { return !is_option(word); });
+}
+
 bool lacks_a_number(std::string_view word) {
   if (const std::size_t value = word.find('='); word.substr(0, 1) == "-" && value != std::string_view::npos)
     word.remove_prefix(value + 1);

@@ -110,6 +110,7 @@ ExitCode calibrate_corners(const CalibrateArgs& args, Run& run) {
   std::vector<SkippedInput>& skipped = run.document.counts.skipped;
   run.add_input("corners", args.corners);
   std::vector<BoardView> views = read_corners(args.corners, num_points(args.board), args.skip_bad ? &skipped : nullptr);
+  if (views.empty() && skipped.empty()) throw InputError(args.corners + ": has no corners");
   ImageSize size = args.size;
   if (size.width_px == 0 && args.config.port.air) {
     size = {args.config.port.air->width_px, args.config.port.air->height_px};

@@ -166,6 +166,10 @@ TEST_F(CalibrateSurvives, WrongRowsOfCornersStopOrAreNamed) {
   ASSERT_EQ(calibrate({photos().string()}).code, 0);
   const std::string table = read_file(out() / "corners.csv");
   const fs::path bad = photos().parent_path() / "bad.csv";
+  write_file(bad, table.substr(0, table.find('\n') + 1));
+  const Outcome empty = calibrate({"--corners", bad.string()});
+  EXPECT_EQ(empty.code, 3);
+  EXPECT_THAT(empty.err, HasSubstr("bad.csv: has no corners"));
   write_file(bad, table + "late.png,nan,1,2,1,1,0\n" + photo_name(0) + ",3,nan,2,1,1,0\n");
   const Outcome stopped = calibrate({"--corners", bad.string()});
   EXPECT_EQ(stopped.code, 3);

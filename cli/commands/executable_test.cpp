@@ -117,6 +117,37 @@ TEST(Executable, HelpIsACommandToo) {
   const Outcome outcome = run_alidade({"help", "camera", "show"});
   EXPECT_EQ(outcome.code, 0);
   EXPECT_EQ(outcome.out, run_alidade({"camera", "show", "--help"}).out);
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"help", "calibrat"}, {"help", "plan", "nosuch"}, {"simulate", "nosuch", "--help"}}) {
+    const Outcome unknown = run_alidade(words);
+    EXPECT_EQ(unknown.code, 2) << joined(words);
+    EXPECT_THAT(unknown.err,
+                HasSubstr("unknown command '" + std::string(words[0] == "help" ? words.back() : words[1])));
+  }
+}
+
+/// A file is read twice, for its checksum and for its content: of a pipe the second found nothing.
+TEST(Executable, InputsMayComeByAPipe) {
+  const testing::TemporaryFolder folder;
+  const auto in_shell = [&](const std::string& line) {
+    return run_program({"/bin/bash", "-c", std::string("alidade() { ") + ALIDADE_EXECUTABLE + " \"$@\"; }; " + line},
+                       folder.path().string());
+  };
+  ASSERT_EQ(in_shell("alidade simulate track --duration 3 --out sim --quiet --no-report").code, 0);
+  const std::string asked = " --rig sim/rig.yaml --json --no-report --out ";
+  const std::string by_name = in_shell("alidade track sim/events.csv --truth sim/truth.csv" + asked + "a").out;
+  const auto estimate_of = [](const std::string& text) {
+    const std::size_t at = text.find("\"estimate\""), end = text.find("\"seconds\"");
+    return text.substr(at, end == std::string::npos ? end : end - at);
+  };
+  ASSERT_THAT(by_name, HasSubstr("\"rms_m\""));
+  for (const std::string line : {"alidade track <(cat sim/events.csv) --truth=<(cat sim/truth.csv)",
+                                 "cat sim/events.csv | alidade track /dev/stdin --truth sim/truth.csv"}) {
+    const Outcome outcome = in_shell(line + asked + "b");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(estimate_of(outcome.out).substr(0, 2000), estimate_of(by_name).substr(0, 2000)) << line;
+  }
+  EXPECT_THAT(in_shell("alidade track <(true)" + asked + "c").err, HasSubstr("is empty"));
 }
 
 /// Half of a camera's observations are not solved for by design: the schema says so.

@@ -92,7 +92,8 @@ FieldList frame_fields(LocalizeArgs& args) {
        .value = &args.target,
        .help = "What gives scale and the map's frame (target.yaml): known points; in images a rectangle, a board, or "
                "points with patches",
-       .form = "FILE"},
+       .form = "FILE",
+       .old_options = {"--landmarks"}},
       {.name = "map",
        .value = &args.map,
        .help =

@@ -64,7 +64,7 @@ TEST_F(LocalizeCommand, GivesThePathWithTheNamesOfTheContract) {
   EXPECT_EQ(poses.num_rows(), 35u);
   for (std::size_t row = 0; row < 35; ++row) EXPECT_GT(poses.number(row, "cov_x_x"), 0.0);
   // What was written is read again, as a truth: the same path.
-  const Outcome again = localize({"--target", path("sim/target.yaml"), "--start", path("sim/start.yaml"), "--truth",
+  const Outcome again = localize({"--landmarks", path("sim/target.yaml"), "--start", path("sim/start.yaml"), "--truth",
                                   path("out/trajectory.tum"), "--json"});
   ASSERT_EQ(again.code, 0) << again.err;
   EXPECT_LT(Json::parse(again.out)["estimate"]["ate_m"], 1e-6);

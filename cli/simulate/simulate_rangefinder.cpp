@@ -21,7 +21,7 @@ namespace {
 struct SimulateRangefinderArgs {
   std::string scenario = "reference", laser = "red";
   std::filesystem::path camera;
-  int shots = 18;
+  std::optional<int> shots;
   double sigma_range_m = 0.002, scale = 1.0;
   ShotNoise noise;
   ShotMistake mistake;
@@ -42,7 +42,7 @@ RangefinderScene scene_of(const SimulateRangefinderArgs& args, Run& run) {
     run.add_input("camera", args.camera);
     config->camera = read_central_camera(args.camera);
   }
-  config->num_shots = args.shots;
+  config->num_shots = args.shots.value_or(config->num_shots);
   config->beam.noise = {args.sigma_range_m, 0.0, 0.0};
   config->beam.scale = args.scale;
   return draw_rangefinder_scene(*config, run.options.seed);
@@ -116,8 +116,8 @@ ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   run.document.estimate["outliers"] = std::move(outliers);
   run.document.counts.given = run.document.counts.used = simulated.shots.size();
   Verdict verdict;
-  verdict.sentence = fmt::format("{} shots of a rangefinder with known truth; board {}x{}, {:g} m", args.shots,
-                                 scene.board.cols, scene.board.rows, scene.board.square_m);
+  verdict.sentence = fmt::format("{} shots of a rangefinder with known truth; board {}x{}, {:g} m",
+                                 simulated.shots.size(), scene.board.cols, scene.board.rows, scene.board.square_m);
   run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
   return run.finish(verdict);
 }
@@ -184,7 +184,7 @@ void add_rangefinder_scenario(App& app) {
       [args](Run& run) { return simulate_rangefinder(*args, run); });
   command.add_option("--scenario", args->scenario, fmt::format("{}", fmt::join(rangefinder_scenarios(), ", ")))
       ->capture_default_str();
-  command.add_option("--shots", args->shots, "How many shots")->check(CLI::Range(1, 10000))->capture_default_str();
+  command.add_option("--shots", args->shots, "How many shots (default: the scenario's)")->check(CLI::Range(1, 10000));
   command.add_option("--camera", args->camera, "The true camera; without it one is made up")->type_name("FILE");
   add_number(command, "--sigma-range-m", args->sigma_range_m, "Noise of a reading [m]", 0.0, 1.0);
   add_number(command, "--sigma-px", args->noise.sigma_spot_px, "Noise of a spot's coordinate", 0.0, 100.0);

@@ -37,6 +37,19 @@ TEST(SimulateBoard, LeavesPhotosWithTheirTruth) {
   EXPECT_EQ(Csv::read(folder.path() / "truth_board.csv").num_rows(), 54u);
 }
 
+TEST(SimulateRangefinder, AScenarioHasItsNumberOfShots) {
+  const TemporaryFolder folder;
+  const auto num_shots = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words{ALIDADE_EXECUTABLE, "simulate", "rangefinder", "--out", folder.path().string()};
+    words.insert(words.end(), more.begin(), more.end());
+    EXPECT_EQ(testing::run_program(words).code, 0);
+    return Csv::read(folder.path() / "shots.csv").num_rows();
+  };
+  EXPECT_EQ(num_shots({}), 18u);
+  EXPECT_EQ(num_shots({"--scenario", "four_shots"}), 4u);
+  EXPECT_EQ(num_shots({"--scenario", "four_shots", "--shots", "6"}), 6u);
+}
+
 TEST(SimulateBoard, CornersScatterAboutTheTruthAsTheySay) {
   const TemporaryFolder folder;
   const Outcome outcome = simulate_board(folder.path(), {"--photos", "20", "--corners-only", "--sigma-px", "0.3"});

@@ -144,9 +144,12 @@ struct PathError {
   /// RMS of the positions' stated σ (root of the trace), with the aligned scale: what `ate_m` should not be above, as
   /// an alignment takes errors away and adds none.
   double stated_m = std::numeric_limits<double>::quiet_NaN();
-  /// Mean of dᵀ Σ⁻¹ d of the aligned positions, over their 3 coordinates (Bar-Shalom, eq. 5.4.2-3). Errors of a path
-  /// are alike from frame to frame, and aligned away in part: below 1 is no fault.
+  /// Mean of dᵀ Σ⁻¹ d of the poses as they are, over 6 (Bar-Shalom, eq. 5.4.2-3); NaN where the truth is in another
+  /// frame: farther from the path than 10 σ and a tenth of its size, or turned by more than 0.2 rad.
   double nees_per_dof = std::numeric_limits<double>::quiet_NaN();
+  /// The same of the aligned positions, over 3. Σ is that in the path's frame, and errors that all frames share are
+  /// aligned away: far below 1 is no fault, above 1 is one.
+  double nees_aligned_per_dof = std::numeric_limits<double>::quiet_NaN();
   std::size_t num_pairs = 0;
 };
 

@@ -190,7 +190,8 @@ rpe_m         m      with truth: from frame to frame
 rpe_rad       rad    with truth: from frame to frame
 unaligned_m   m      with truth: RMS without alignment
 stated_m      m      RMS of the stated σ
-nees_per_dof  1      with truth: normalised error squared of the aligned positions, over 3; above 1 where σ is too small
+nees_per_dof  1      with truth: normalised error squared of the poses, over 6; 1 where σ is right; null where the truth is in another frame
+nees_aligned_per_dof  1      with truth: the same of the aligned positions, over 3; above 1 where σ is too small
 alignment     text   with truth: none, rigid or similarity
 nis_per_dof   1      1 where the innovations are as predicted
 sigma_px      px     of a coordinate

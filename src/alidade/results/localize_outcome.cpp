@@ -87,6 +87,7 @@ void fill_path_estimate(const Localization& result, ResultDocument& document) {
   estimate["unaligned_m"] = result.scale_known ? result.error.unaligned_m : missing_value;
   estimate["stated_m"] = result.error.stated_m;
   estimate["nees_per_dof"] = result.error.nees_per_dof;
+  estimate["nees_aligned_per_dof"] = result.error.nees_aligned_per_dof;
   estimate["alignment"] = result.truth.empty() ? JsonValue() : JsonValue(result.scale_known ? "SE(3)" : "Sim(3)");
   estimate["nis_per_dof"] = result.nis_per_dof;
   estimate["sigma_px"] = result.sigma_px;

@@ -72,12 +72,11 @@ void widen_by_times(double sigma_s, Localization& result) {
 void add_path_error(Localization& result) {
   if (result.truth.empty()) return;
   std::vector<TimedPose> path;
-  std::vector<Eigen::Matrix3d> covs;
+  std::vector<Eigen::Matrix<double, 6, 6>> covs;
   for (const PathStep& step : result.path) {
     if (!step.has_pose()) continue;
     path.push_back({step.t_s, step.world_from_cam});
-    const Eigen::Matrix3d R = step.world_from_cam.rotation.toRotationMatrix();
-    covs.push_back(R * step.cov.topLeftCorner<3, 3>() * R.transpose());
+    covs.push_back(step.cov);
   }
   if (!path.empty()) result.error = path_error(path, result.truth, result.scale_known, covs);
 }

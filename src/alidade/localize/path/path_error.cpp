@@ -9,7 +9,15 @@ namespace {
 
 struct Pair {
   Rigid3 estimated, truth;
-  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();  ///< Of the estimated position.
+  Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();  ///< Of the right perturbation.
+
+  [[nodiscard]] Eigen::Matrix3d position_cov() const {
+    const Eigen::Matrix3d R = estimated.rotation.toRotationMatrix();
+    return R * cov.topLeftCorner<3, 3>() * R.transpose();
+  }
+  [[nodiscard]] Eigen::Vector3d rotation_error() const {
+    return log_so3(truth.rotation.conjugate() * estimated.rotation);
+  }
 };
 
 /// RPE: between neighbours, with the aligned scale.
@@ -37,14 +45,41 @@ void add_aligned(std::span<const Pair> pairs, const Similarity& fit, bool has_co
     const Eigen::Vector3d d = moved - pair.truth.translation;
     const Eigen::Matrix3d R = fit.scale * fit.b_from_a.rotation.toRotationMatrix();
     sum2 += d.squaredNorm();
-    variance_m2 += fit.scale * fit.scale * pair.cov.trace();
-    if (has_covs) nees += squared_mahalanobis(d, R * pair.cov * R.transpose());
+    const Eigen::Matrix3d cov = R * pair.position_cov() * R.transpose();
+    variance_m2 += cov.trace();
+    if (has_covs) nees += squared_mahalanobis(d, cov);
   }
   const auto num = static_cast<double>(pairs.size());
   error.ate_m = std::sqrt(sum2 / num);
   if (!has_covs) return;
   error.stated_m = std::sqrt(variance_m2 / num);
-  error.nees_per_dof = nees / (3.0 * num);
+  error.nees_aligned_per_dof = nees / (3.0 * num);
+}
+
+/// Whether the truth is in the frame of the path: no farther from it than errors are.
+bool is_in_one_frame(std::span<const Pair> pairs, const PathError& error) {
+  constexpr double max_sigma = 10.0, max_of_size = 0.1, max_rotation_rad = 0.2;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Pair& pair : pairs) mean += pair.truth.translation / static_cast<double>(pairs.size());
+  double size2 = 0.0, rotation2 = 0.0;
+  for (const Pair& pair : pairs) {
+    size2 += (pair.truth.translation - mean).squaredNorm();
+    rotation2 += pair.rotation_error().squaredNorm();
+  }
+  const auto num = static_cast<double>(pairs.size());
+  return error.unaligned_m <= std::max(max_sigma * error.stated_m, max_of_size * std::sqrt(size2 / num)) &&
+         std::sqrt(rotation2 / num) <= max_rotation_rad;
+}
+
+double nees_of_poses(std::span<const Pair> pairs) {
+  double sum = 0.0;
+  for (const Pair& pair : pairs) {
+    Eigen::Vector<double, 6> d;
+    d << pair.estimated.rotation.conjugate() * (pair.estimated.translation - pair.truth.translation),
+        pair.rotation_error();
+    sum += squared_mahalanobis(d, pair.cov);
+  }
+  return sum / (6.0 * static_cast<double>(pairs.size()));
 }
 
 }  // namespace
@@ -56,7 +91,7 @@ const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s, doub
 }
 
 PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth, bool is_rigid,
-                     std::span<const Eigen::Matrix3d> covs) {
+                     std::span<const Eigen::Matrix<double, 6, 6>> covs) {
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < estimated.size(); ++i) {
     const TimedPose* const there = nearest_pose(truth, estimated[i].t_s);
@@ -81,6 +116,7 @@ PathError path_error(std::span<const TimedPose> estimated, std::span<const Timed
   error.scale = fit->scale;
   add_aligned(pairs, *fit, !covs.empty(), error);
   add_steps(pairs, error);
+  if (is_rigid && !covs.empty() && is_in_one_frame(pairs, error)) error.nees_per_dof = nees_of_poses(pairs);
   return error;
 }
 

@@ -13,9 +13,9 @@ constexpr double same_time_s = 0.01;
 [[nodiscard]] const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s,
                                             double tolerance_s = same_time_s);
 
-/// Each estimated pose is compared with the true one of its time. `covs`: of each estimated position, in its
-/// world [m²], or empty.
+/// Each estimated pose is compared with the true one of its time. `covs`: of each estimated pose, of
+/// the right perturbation (translation [m], rotation [rad]), or empty.
 [[nodiscard]] PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth,
-                                   bool is_rigid, std::span<const Eigen::Matrix3d> covs = {});
+                                   bool is_rigid, std::span<const Eigen::Matrix<double, 6, 6>> covs = {});
 
 }  // namespace alidade

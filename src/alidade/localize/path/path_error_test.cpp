@@ -16,13 +16,13 @@ struct Paths {
 };
 
 /// A winding path and what an estimator may make of it: another frame, another scale, noise.
-Paths noisy_paths(std::mt19937_64& rng, double scale, double sigma_m) {
+Paths noisy_paths(std::mt19937_64& rng, double scale, double sigma_m, bool in_another_frame = true) {
   std::normal_distribution<double> normal;
   const auto vector = [&] {
     const double x = normal(rng), y = normal(rng), z = normal(rng);
     return Eigen::Vector3d(x, y, z);
   };
-  const Rigid3 map_from_world{exp_so3(vector()), vector()};
+  const Rigid3 map_from_world = in_another_frame ? Rigid3{exp_so3(vector()), vector()} : Rigid3{};
   Paths paths;
   for (int k = 0; k < 200; ++k) {
     const double t_s = 0.05 * k;
@@ -111,13 +111,30 @@ TEST(PathError, StatesWhatSigmaSays) {
   auto rng = testing::make_rng();
   for (const double scale : {1.0, 2.7}) {
     const Paths paths = noisy_paths(rng, scale, 0.02);
-    const std::vector<Eigen::Matrix3d> covs(paths.estimated.size(), 0.02 * 0.02 * Eigen::Matrix3d::Identity());
+    const std::vector<Eigen::Matrix<double, 6, 6>> covs(paths.estimated.size(),
+                                                        0.02 * 0.02 * Eigen::Matrix<double, 6, 6>::Identity());
     const PathError error = path_error(paths.estimated, paths.truth, scale == 1.0, covs);
     EXPECT_NEAR(error.stated_m, scale * std::sqrt(3.0) * 0.02, 0.1 * error.stated_m);
     EXPECT_NEAR(error.ate_m / error.stated_m, 1.0, 0.1);
-    EXPECT_NEAR(error.nees_per_dof, 1.0, 0.2) << "independent errors of a σ that is right, 600 of them less 7";
+    EXPECT_NEAR(error.nees_aligned_per_dof, 1.0, 0.2) << "independent errors of a σ that is right, 600 of them less 7";
   }
   EXPECT_TRUE(std::isnan(path_error({}, {}, true).stated_m));
+}
+
+/// Poses that err as stated, in the truth's frame: 1, as 1200 independent numbers scatter; an alignment needs none of
+/// it.
+TEST(PathError, NeesIsThatOfThePosesWhereTheTruthIsInTheirFrame) {
+  auto rng = testing::make_rng();
+  Eigen::Vector<double, 6> sigma;
+  sigma << 0.02, 0.02, 0.02, 0.01, 0.01, 0.01;
+  const Eigen::Matrix<double, 6, 6> cov = sigma.cwiseAbs2().asDiagonal();
+  const std::vector<Eigen::Matrix<double, 6, 6>> covs(200, cov), too_small(200, 0.04 * cov);
+  const Paths paths = noisy_paths(rng, 1.0, 0.02, /*in_another_frame=*/false);
+  EXPECT_NEAR(path_error(paths.estimated, paths.truth, true, covs).nees_per_dof, 1.0, 0.2);
+  EXPECT_NEAR(path_error(paths.estimated, paths.truth, true, too_small).nees_per_dof, 25.0, 5.0);
+  EXPECT_TRUE(std::isnan(path_error(paths.estimated, paths.truth, false, covs).nees_per_dof)) << "of no scale";
+  const Paths other = noisy_paths(rng, 1.0, 0.02);
+  EXPECT_TRUE(std::isnan(path_error(other.estimated, other.truth, true, covs).nees_per_dof));
 }
 
 /// Truth at 200 Hz: the pose of the frame's own time, not the first within the tolerance.

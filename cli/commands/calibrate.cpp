@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "alidade/board/board_fields.h"
+#include "alidade/calibrate/setup.h"
 #include "alidade/formats/camera_file.h"
 #include "alidade/results/calibration_outcome.h"
 #include "alidade/tables/corner_file.h"
@@ -119,6 +120,8 @@ ExitCode calibrate_corners(const CalibrateArgs& args, Run& run) {
     run.say(fmt::format("image size {}x{} is the least that holds the corners: give --size WIDTHxHEIGHT", size.width_px,
                         size.height_px));
   }
+  if (const std::string fault = outside_fault(views, size); !fault.empty())
+    throw InputError(args.corners + ": " + fault);
   const Calibration result = alidade::calibrate(std::move(views), size, args.board, args.config, run.progress);
   run.lap("solve");
   require_size(args, size);

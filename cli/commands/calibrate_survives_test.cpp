@@ -189,8 +189,9 @@ TEST_F(CalibrateSurvives, ASizeThatIsNotTheImagesIsNamed) {
   EXPECT_FALSE(fs::exists(out()));
   ASSERT_EQ(calibrate({photos().string()}).code, 0);
   const Outcome outcome = calibrate({"--corners", (out() / "corners.csv").string(), "--size", "100x100"});
-  EXPECT_EQ(outcome.code, 2);
+  EXPECT_EQ(outcome.code, 3);
   expect_one_line(outcome);
+  EXPECT_THAT(outcome.err, HasSubstr("corners.csv: "));
   EXPECT_THAT(outcome.err, HasSubstr("check the size"));
 }
 

@@ -15,6 +15,32 @@
 namespace alidade {
 namespace {
 
+/// How many corners lie outside the images, and how many there are.
+std::pair<std::size_t, std::size_t> count_outside(std::span<const BoardView> views, const ImageSize& size) {
+  std::size_t num_outside = 0, num = 0;
+  for (const BoardView& view : views) {
+    num += view.corners.size();
+    num_outside += static_cast<std::size_t>(std::ranges::count_if(view.corners, [&](const Corner& corner) {
+      return !(corner.px.minCoeff() > -1.0 && corner.px.x() < size.width_px && corner.px.y() < size.height_px);
+    }));
+  }
+  return {num_outside, num};
+}
+
+std::string outside_text(std::size_t num_outside, std::size_t num, const ImageSize& size) {
+  return fmt::format("{} of {} corners lie outside images of {}x{} px", num_outside, num, size.width_px,
+                     size.height_px);
+}
+
+}  // namespace
+
+std::string outside_fault(std::span<const BoardView> views, const ImageSize& size) {
+  const auto [num_outside, num] = count_outside(views, size);
+  return 10 * num_outside > num ? outside_text(num_outside, num, size) + ": check the size" : "";
+}
+
+namespace {
+
 bool may_stand_behind_a_port(const Lens& lens) {
   return std::holds_alternative<Calibrated<Pinhole>>(lens) || std::holds_alternative<Calibrated<Brown>>(lens);
 }
@@ -74,25 +100,17 @@ void require_sense(std::span<const BoardView> views, const ImageSize& size, cons
   }
 }
 
-/// Corners outside the images: of images of another size. A few may be wrong corners; more than one in ten are refused.
+/// A few corners outside the images may be wrong ones.
 Check inside_check(std::span<const BoardView> views, const ImageSize& size) {
-  Check check{.name = "corners inside", .text = "all corners are inside the images", .unit = "corners"};
-  std::size_t num_outside = 0, num = 0;
-  for (const BoardView& view : views) {
-    for (const Corner& corner : view.corners) {
-      const bool is_inside =
-          corner.px.minCoeff() > -1.0 && corner.px.x() < size.width_px && corner.px.y() < size.height_px;
-      num_outside += is_inside ? 0 : 1;
-      ++num;
-    }
-  }
-  if (num_outside == 0) return check;
-  check.state = State::care;
-  check.value = static_cast<double>(num_outside);
-  check.text =
-      fmt::format("{} of {} corners lie outside images of {}x{} px", num_outside, num, size.width_px, size.height_px);
-  if (10 * num_outside > num) throw ConfigError(check.text + ": check the size");
-  return check;
+  if (const std::string fault = outside_fault(views, size); !fault.empty()) throw ConfigError(fault);
+  const auto [num_outside, num] = count_outside(views, size);
+  if (num_outside == 0)
+    return {.name = "corners inside", .text = "all corners are inside the images", .unit = "corners"};
+  return {.name = "corners inside",
+          .state = State::care,
+          .text = outside_text(num_outside, num, size),
+          .value = static_cast<double>(num_outside),
+          .unit = "corners"};
 }
 
 /// Squares that no printed board has: of another unit. The lens is right with them, the poses are not.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,9 @@ namespace alidade {
 
 /// Every fault of `config`, one sentence each; empty if it is usable.
 [[nodiscard]] std::vector<std::string> faults(const CalibrateConfig& config);
+
+/// What is wrong where more than one corner in ten lies outside the images, which are then of another size; or empty.
+[[nodiscard]] std::string outside_fault(std::span<const BoardView> views, const ImageSize& size);
 
 /// How many usable views it takes: three, two where the principal point is fixed (Zhang 2000, §3.1).
 [[nodiscard]] std::size_t min_views(const CalibrateConfig& config);

@@ -32,8 +32,7 @@ FieldList sigma_fields(RangefinderConfig& config) {
           {.name = "sigma_flat_m",
            .value = &config.sigma_flat_m,
            .help = "σ of how far the surface that the beam meets lies off the plane of the board's corners, as of a "
-                   "sheet before the print [m]; 0: exact (default: 3 mm are, as far as the shots leave them open and "
-                   "they move the beam by more than its σ)",
+                   "sheet before the print [m]; 0: exact (default: nothing is counted but what the shots show of it)",
            .limits = share,
            .option = "--sigma-flat"},
           {.name = "sigma_scale",

@@ -25,9 +25,6 @@ enum class Refine {
   all,   ///< Lens (as its covariance allows), poses and beam together.
 };
 
-/// A pane before a print, as of a picture frame. [m]
-inline constexpr double ordinary_sheet_m = 0.003;
-
 /// Options of rangefinder(). Plain data with usable defaults.
 struct RangefinderConfig {
   RangefinderMethod method = RangefinderMethod::joint;
@@ -45,10 +42,7 @@ struct RangefinderConfig {
   /// σ of what is given of lengths: carried into the beam's covariance. 0: exact. None: nothing is known.
   std::optional<double> sigma_square_m = {};  ///< Of the length of the board's squares.
   std::optional<double> sigma_flat_m = {};    ///< Of the surface that the beam meets, off the plane of the corners.
-  /// The same where it is not told, of which only what moves the beam by more than its σ is counted: CountedSheet.
-  /// solve_rangefinder() sets it to ordinary_sheet_m.
-  double untold_sheet_m = 0.0;
-  std::optional<double> sigma_scale = {};  ///< Of the scale of the readings, where that is not estimated.
+  std::optional<double> sigma_scale = {};     ///< Of the scale of the readings, where that is not estimated.
   bool reject_outliers = true;
   double outlier_sigmas = 6.0;
   int num_draws = 100;  ///< Of the search for outliers; a sample of five without any of 3 wrong in 18 comes once in 3.

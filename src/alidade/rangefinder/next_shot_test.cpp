@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "alidade/rangefinder/checks/repeated_shots.h"
 #include "alidade/rangefinder/shot_plan.h"
 #include "alidade/testing/rangefinder_sample.h"
@@ -100,19 +98,6 @@ TEST(NextShot, CountsASheetThatIsTold) {
     config.sigma_flat_m = sigma_m;
     expect_ones(planned_over_stated(config, 8, {}));
   }
-}
-
-/// With a sheet that may be there, shots tell its thickness by the tilt of the board.
-TEST(NextShot, TiltsTheBoardWhereASheetMayBeBeforeThePrint) {
-  RangefinderSceneConfig scene = *rangefinder_scenario("reference");
-  scene.num_shots = 8;
-  const RangefinderReport report = solved(draw_rangefinder_sample(scene, {}, 3), given_board()).report;
-  const BeamNow now = beam_now(report, given_board());
-  ASSERT_GT(now.sheet.share, 0.0);
-  const auto plan = plan_next_shots(now, {}, 5);
-  ASSERT_EQ(plan.size(), 5u);
-  EXPECT_LT(plan.back().sigma_origin_m, std::sqrt(now.beam.cov.topLeftCorner<3, 3>().trace()));
-  EXPECT_TRUE(std::ranges::any_of(plan, [](const NextShot& shot) { return shot.tilt_rad > 0.5; }));
 }
 
 TEST(NextShot, LeavesWhatAFixedLensAddsToTheBeam) {

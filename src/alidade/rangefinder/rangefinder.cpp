@@ -205,11 +205,6 @@ void carry_scale(RangefinderReport& report) {
   if (z > hardly && z < proved) variance += away * away;
 }
 
-void carry_sheet(RangefinderReport& report) {
-  report.sheet.share = counted_share(report.sheet, report.beam.cov);
-  report.beam.cov += report.sheet.counted();
-}
-
 CommonState start_state(const BeamProblem& problem, const Camera& camera, const Beam& beam) {
   CommonState state{beam, camera, {}};
   for (const PreparedShot& shot : problem.shots)
@@ -300,7 +295,7 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
   if (config.refine == Refine::all) carry_surprise(report);
   carry_asked(report);
   carry_scale(report);
-  carry_sheet(report);
+  report.beam.cov += report.sheet.counted();
 }
 
 void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, const RangefinderConfig& config,

@@ -51,17 +51,13 @@ struct ShotCause {
   BeamVector moves = BeamVector::Zero();  ///< Of the beam, were it of that size.
 };
 
-/// A sheet before the print, whose surface the beam meets instead: what of it the shots leave open, and what of that
-/// the beam's covariance counts. One that was told is counted as it is, one that was not so far that it moves no
-/// parameter of the beam by more than σ.
+/// A sheet before the print, whose surface the beam meets instead: of one that was told, what the shots leave open.
 struct CountedSheet {
-  double sigma_m = 0.0;  ///< Of its thickness, told or ordinary; 0: none is counted.
-  bool is_told = false;
+  double sigma_m = 0.0;                   ///< Of its thickness; 0: none is counted.
   double left_m = 0.0;                    ///< Of the thickness, with what the shots say of it.
   BeamVector moves = BeamVector::Zero();  ///< Of the beam, by left_m.
-  double share = 0.0;                     ///< Of these moves in Beam::cov.
 
-  [[nodiscard]] BeamMatrix counted() const { return share * share * moves * moves.transpose(); }
+  [[nodiscard]] BeamMatrix counted() const { return moves * moves.transpose(); }
 };
 
 /// Distortion that the camera file gave without σ, and that was estimated from the shots.

@@ -32,11 +32,9 @@ noise.
   spot_from        text  residuals, or given
   range_from       text  residuals, or given
 sheet.
-  sigma_m   m     of a sheet before the print
-  from      text  given, or ordinary
+  sigma_m   m     of a sheet before the print, as given
   left_m    m     of it, with what the shots say
   moves[6]  any   of origin [m], direction [rad] and scale, by left_m
-  share     1     of these moves that the covariance counts
 @board board.
 left_out.
   rms_range_m  m   of shots predicted from the others

@@ -222,14 +222,12 @@ void fill_beam(const RangefinderCalibration& report, ResultDocument& document) {
     for (Eigen::Index j = i; j < 7; ++j) document.covariance_upper.push_back(report.covariance(i, j));
 }
 
-/// What the next shots are planned with: of a sheet that may lie before the print, what the shots leave open.
+/// What the next shots are planned with: of a sheet that was told, what the shots leave open.
 void put_sheet(const CountedSheet& sheet, JsonValue& estimate) {
   if (!(sheet.left_m > 0.0)) return;
   estimate["sheet"]["sigma_m"] = sheet.sigma_m;
-  estimate["sheet"]["from"] = sheet.is_told ? "given" : "ordinary";
   estimate["sheet"]["left_m"] = sheet.left_m;
   estimate["sheet"]["moves"] = Numbers(sheet.moves.begin(), sheet.moves.end());
-  estimate["sheet"]["share"] = sheet.share;
 }
 
 void fill_geometry_and_noise(const RangefinderCalibration& result, JsonValue& estimate) {

@@ -63,9 +63,7 @@ CountedSheet sheet_in(const Json& estimate) {
   if (!estimate.contains("sheet")) return sheet;
   const Json& json = estimate.at("sheet");
   sheet.sigma_m = json.at("sigma_m").get<double>();
-  sheet.is_told = json.at("from") == "given";
   sheet.left_m = json.at("left_m").get<double>();
-  sheet.share = json.at("share").get<double>();
   for (int i = 0; i < num_beam_params; ++i) sheet.moves[i] = json.at("moves").at(static_cast<std::size_t>(i));
   return sheet;
 }

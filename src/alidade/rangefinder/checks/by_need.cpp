@@ -142,7 +142,6 @@ SolvedRangefinder solve_rangefinder(std::span<const Shot> given, std::span<const
                                     const Camera& camera, const RangefinderConfig& told, const Progress& progress) {
   const Shots shots{given, points_in_board, progress};
   RangefinderConfig config = told;
-  config.untold_sheet_m = ordinary_sheet_m;
   SolvedRangefinder best = shots.solved_with(camera, config);
   if (config.sigma_range_m || config.sigma_spot_px)
     if (auto found = with_found_sigmas(shots, camera, config, best.verdict.state == State::good ? 3.0 : 1.0)) {

@@ -221,10 +221,9 @@ void add_shared_errors(const RangefinderReport& report, Verdict& verdict) {
                            ask_beyond, "σ", "residuals");
     if (cause.sigmas >= ask_beyond && is_alike(cause) && cause.sigmas < most) {
       check.text = "another cause explains more than " + cause.name + " (" + text_of(cause.sigmas, 2) + "σ) would";
-    } else if (cause.sigmas < ask_beyond && cause.name == "sheet" && report.sheet.share > 0.0) {
+    } else if (cause.sigmas < ask_beyond && cause.name == "sheet" && report.sheet.left_m > 0.0) {
       check.text = "no sheet before the print is indicated; " + text_of(1e3 * report.sheet.left_m, 2) +
-                   " mm of one, which the shots leave open, are counted in σ" +
-                   (report.sheet.is_told ? "" : ": --sigma-flat 0 where the beam meets the print");
+                   " mm of one, which the shots leave open, are counted in σ";
     } else if (cause.sigmas >= ask_beyond) {
       check.state = State::care;
       check.text = said_of(cause) + (is_alike(cause) ? alike(cause, report.causes) : "");

@@ -155,8 +155,7 @@ Eigen::Vector3d sheet_share(const PreparedShot& shot, const Beam& beam, const Ca
 
 CountedSheet open_sheet(const BeamProblem& problem, const ReducedSystem& system, const SolvedPart& part,
                         const RangefinderReport& report, const RangefinderConfig& config) {
-  CountedSheet sheet{.sigma_m = config.sigma_flat_m.value_or(config.untold_sheet_m),
-                     .is_told = config.sigma_flat_m.has_value()};
+  CountedSheet sheet{.sigma_m = config.sigma_flat_m.value_or(0.0)};
   if (!(sheet.sigma_m > 0.0) || !std::ranges::any_of(system.shots, &ReducedShot::has_corners)) return {};
   const ShotShares shares = shares_of(problem, report);
   const auto num = static_cast<Index>(part.places.size());
@@ -169,14 +168,6 @@ CountedSheet open_sheet(const BeamProblem& problem, const ReducedSystem& system,
 
 double left_of(double sigma_m, double information) {
   return 1.0 / std::sqrt(std::pow(sigma_m, -2) + std::max(0.0, information));
-}
-
-double counted_share(const CountedSheet& sheet, const BeamMatrix& cov) {
-  if (sheet.is_told) return 1.0;
-  double most2 = 0.0;  // of the moves in σ
-  for (Index i = 0; i < num_beam_params; ++i)
-    if (cov(i, i) > 0.0) most2 = std::max(most2, sheet.moves[i] * sheet.moves[i] / cov(i, i));
-  return most2 > 1.0 ? std::sqrt(1.0 - 1.0 / most2) : 0.0;
 }
 
 std::vector<ShotCause> error_causes(const BeamProblem& problem, const ReducedSystem& system, const SolvedPart& part,

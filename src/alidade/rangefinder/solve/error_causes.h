@@ -16,14 +16,11 @@ namespace alidade {
 [[nodiscard]] Eigen::Vector3d sheet_share(const PreparedShot& shot, const Beam& beam, const Camera& camera,
                                           const ShotModel& model);
 
-/// What the shots leave open of a sheet before the print that was told, or else of an ordinary one; `share` is not set.
+/// What the shots leave open of a sheet before the print that was told.
 [[nodiscard]] CountedSheet open_sheet(const BeamProblem& problem, const ReducedSystem& system, const SolvedPart& part,
                                       const RangefinderReport& report, const RangefinderConfig& config);
 
 /// σ of a sheet's thickness with what shots say of it. [m]
 [[nodiscard]] double left_of(double sigma_m, double information);
-
-/// CountedSheet::share with a beam of that covariance.
-[[nodiscard]] double counted_share(const CountedSheet& sheet, const BeamMatrix& cov);
 
 }  // namespace alidade

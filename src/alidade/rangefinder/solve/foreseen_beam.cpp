@@ -182,9 +182,6 @@ BeamMatrix ForeseenBeam::counted_sheet(const MatrixXd& information, const Matrix
   sheet.left_m = left_of(sheet.sigma_m, information.diagonal().tail<1>()[0] + column.dot(moves));
   sheet.moves.setZero();
   sheet.moves.head(p) = sheet.left_m * moves.head(p);
-  BeamMatrix of_beam = BeamMatrix::Zero();
-  of_beam.topLeftCorner(p, p) = cov.topLeftCorner(p, p);
-  sheet.share = counted_share(sheet, of_beam);
   return sheet.counted();
 }
 

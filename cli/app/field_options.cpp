@@ -1,6 +1,7 @@
 #include "cli/app/field_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -42,6 +43,17 @@ bool is_typed(const CLI::App& command, const Field& field) {
   return count(option_of(field)) || std::any_of(field.old_options.begin(), field.old_options.end(), count);
 }
 
+/// An option by two of its names: which of both values is meant is not guessed.
+void require_one_name(const CLI::App& command, const Field& field) {
+  std::vector<std::string> typed;
+  for (const std::string& old : field.old_options)
+    if (command.count(old) > 0) typed.push_back(old);
+  if (command.count(option_of(field)) > 0) typed.push_back(option_of(field));
+  if (typed.size() < 2) return;
+  throw UsageError(fmt::format("{}: {} are names of one option, {}: give it once", command.get_name(),
+                               fmt::join(typed, " and "), option_of(field)));
+}
+
 }  // namespace
 
 void add_fields(CLI::App& command, const FieldList& fields) {
@@ -57,6 +69,7 @@ void add_fields(CLI::App& command, const FieldList& fields) {
 }
 
 void take_config(const CLI::App& command, const FieldList& fields, const std::filesystem::path& file) {
+  for (const Field& field : fields) require_one_name(command, field);
   std::vector<std::string> in_file;
   if (!file.empty()) in_file = read_config(file, fields, [&](const Field& field) { return is_typed(command, field); });
   for (const Field& field : fields) {

@@ -15,7 +15,8 @@ namespace alidade::cli {
 void add_fields(CLI::App& command, const FieldList& fields);
 
 /// After the line has been parsed: values of the fields that stand in the file (if there is one) and were not typed;
-/// then, whether all that is required is there. Throws InputError about the file, UsageError about the line.
+/// then, whether all that is required is there, and nothing given by an earlier name of its option as well. Throws
+/// InputError about the file, UsageError about the line.
 void take_config(const CLI::App& command, const FieldList& fields, const std::filesystem::path& file);
 
 }  // namespace alidade::cli

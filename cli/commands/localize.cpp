@@ -22,6 +22,7 @@
 #include "alidade/tables/map_file.h"
 #include "cli/app/app.h"
 #include "cli/app/live.h"
+#include "cli/app/truth_times.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/localize_live.h"
 
@@ -284,19 +285,16 @@ Localization localize_images(LocalizeArgs args, const FrameByFrame& given, std::
   return localize_growing(args.sequence, rate_hz, *args.wait_s, watched);
 }
 
-/// A truth of other times, or of fewer poses than can be aligned, was given in error: that is said in place of a result
-/// without a word of it.
+/// A truth of other times, or of fewer poses than can be aligned, is refused.
 void require_same_times(const std::filesystem::path& file, const Localization& result) {
   constexpr std::size_t fewest = 3;
   const auto num_posed = static_cast<std::size_t>(
       std::ranges::count_if(result.path, [](const PathStep& step) { return step.has_pose(); }));
   const std::size_t num_pairs = result.error.num_pairs;
   if (result.truth.empty() || num_pairs >= fewest || num_posed < fewest) return;
-  throw InputError(fmt::format(
-      "{}: is not of the path's times: {:.3f} to {:.3f} s, the path's are {:.3f} to {:.3f} s; {} of {} frames have a "
-      "pose of their time in it, {} are needed",
-      file.string(), result.truth.front().t_s, result.truth.back().t_s, result.path.front().t_s, result.path.back().t_s,
-      num_pairs, num_posed, fewest));
+  throw truth_of_other_times(
+      file, {result.truth.front().t_s, result.truth.back().t_s}, {result.path.front().t_s, result.path.back().t_s},
+      fmt::format("{} of {} frames have a pose of their time in it, {} are needed", num_pairs, num_posed, fewest));
 }
 
 /// Where there is a truth and no ATE: why.

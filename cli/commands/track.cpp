@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
 
@@ -14,9 +16,11 @@
 #include "alidade/results/track_outcome.h"
 #include "alidade/tables/events_file.h"
 #include "alidade/tables/logs/events_stream.h"
+#include "alidade/track/track.h"
 #include "cli/app/app.h"
 #include "cli/app/live.h"
 #include "cli/app/standard_input.h"
+#include "cli/app/truth_times.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -108,6 +112,22 @@ TargetTrack follow(const TrackArgs& args, std::vector<TargetObservation> observa
   return result;
 }
 
+/// A truth that no position after the warm-up has its time in is refused; a track that is all warm-up has none.
+void require_same_times(const std::filesystem::path& file, const TargetTrack& result) {
+  if (result.truth.t_s.empty() || std::isfinite(result.rms_m) ||
+      !is_estimate(static_cast<int>(result.verdict.exit_code)))
+    return;
+  std::vector<double> t_s;
+  for (const TrackStep& step : result.steps)
+    if (step.has_belief) t_s.push_back(step.t_s);
+  const auto num_true = std::ranges::count_if(t_s, [&](double each_s) { return result.truth.at(each_s).has_value(); });
+  if (t_s.empty() || num_true == std::ssize(t_s)) return;
+  throw truth_of_other_times(
+      file, {result.truth.t_s.front(), result.truth.t_s.back()}, {std::ranges::min(t_s), std::ranges::max(t_s)},
+      fmt::format("{} of {} positions have their time in it, none of them after the first {:g} s", num_true, t_s.size(),
+                  FollowConfig{}.warm_up_s));
+}
+
 /// Rows from standard input as they come, each answered at once with a row of track.csv.
 ExitCode follow_input(const TrackArgs& args, const Rig& rig, const TrueTrack& truth, const live::TrackStream& view,
                       LiveRun& live, Run& run) {
@@ -126,7 +146,9 @@ ExitCode follow_input(const TrackArgs& args, const Rig& rig, const TrueTrack& tr
   }
   report_progress(run.progress, "rows", count, 0);  // the input may have ended by Ctrl-C
   run.lap("read");
-  JobOutcome outcome = outcome_of(tracker.finish(truth, run.progress));
+  const TargetTrack result = tracker.finish(truth, run.progress);
+  require_same_times(args.truth, result);
+  JobOutcome outcome = outcome_of(result);
   run.lap("track");
   add_skipped(events.skipped(), outcome);
   return live.finish(std::move(outcome));
@@ -162,6 +184,7 @@ ExitCode run_track(TrackArgs args, Run& run) {
   run.lap("read");
   const TargetTrack result = follow(args, std::move(events.observations), rig, truth, stream, live);
   run.lap("track");
+  require_same_times(args.truth, result);
   JobOutcome outcome = args.videos.empty() ? outcome_of(result) : outcome_of(result, frames);
   add_skipped(events.skipped, outcome);
   return live.finish(std::move(outcome));

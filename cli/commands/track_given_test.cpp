@@ -28,6 +28,34 @@ class TrackGivenCommand : public testing::CommandTest {
   }
 };
 
+/// A truth that nothing can be compared with is no truth of this path: it is named with both times, and nothing is
+/// left.
+TEST_F(TrackGivenCommand, ATruthOfOtherTimesIsRefused) {
+  simulate();
+  const Csv truth = Csv::read(path("sim/truth.csv"));
+  const std::string live = std::string("'") + ALIDADE_EXECUTABLE + "' track - --quiet --rig '" + path("sim/rig.yaml") +
+                           "' --truth '" + path("other.csv") + "' --out '" + path("out") + "' < '" +
+                           path("sim/events.csv") + "'";
+  const auto refused = [&](double later_s, double until_s, const std::string& what) {
+    std::string text = "t_s,x_m,y_m,z_m\n";
+    for (std::size_t row = 0; row < truth.num_rows() && truth.number(row, "t_s") < until_s; ++row)
+      text += fmt::format("{:.6f},{},{},{}\n", truth.number(row, "t_s") + later_s, truth.text(row, "x_m"),
+                          truth.text(row, "y_m"), truth.text(row, "z_m"));
+    write_file(path("other.csv"), text);
+    for (const testing::Outcome& outcome :
+         {track({"--truth", path("other.csv")}), testing::run_program({"sh", "-c", live})}) {
+      EXPECT_EQ(outcome.code, 3) << outcome.out;
+      EXPECT_THAT(outcome.err, ::testing::HasSubstr("other.csv: is not of the path's times: "));
+      EXPECT_THAT(outcome.err, ::testing::HasSubstr(what));
+      EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+      EXPECT_FALSE(std::filesystem::exists(path("out")));
+    }
+  };
+  refused(1000.0, 2.0, "1000.000 to 1001.9");
+  refused(0.0, 0.005, "0.000 to 0.000 s, the path's are 0.0");
+  refused(0.0, 0.295, "positions have their time in it, none of them after the first 0.5 s");
+}
+
 TEST_F(TrackGivenCommand, AnOptionByTwoOfItsNamesIsRefused) {
   simulate();
   const testing::Outcome both = track({"--motion", "cv", "--method", "imm"});

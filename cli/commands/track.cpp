@@ -209,7 +209,8 @@ void add_track(App& app) {
   command.add_option(
       "events", args->events,
       "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival; - reads "
-      "rows from standard input and answers each");
+      "rows from standard input and answers each; where --sigma-a and --sigma-px are not given by 1 m/s2 and 0.5 px, "
+      "until its end, which estimates them");
   command
       .add_option("--video", args->videos,
                   "Videos or folders of numbered frames instead, one per head of the rig, in its order")

@@ -64,5 +64,30 @@ TEST_F(TrackGivenCommand, AnOptionByTwoOfItsNamesIsRefused) {
   EXPECT_EQ(track({"--motion", "cv"}).code, 0);
 }
 
+TEST_F(TrackGivenCommand, EstimatesTheNoiseThatIsNotGivenAndSaysSo) {
+  const auto sigma_of = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> all{"--json", "--truth", path("sim/truth.csv")};
+    all.insert(all.end(), options.begin(), options.end());
+    const testing::Outcome outcome = track(all);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    const nlohmann::json document = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(document["verdict"]["state"], "good") << document["verdict"];
+    EXPECT_LT(document["estimate"]["nees_per_dof"], 1.8);
+    return std::pair(document["estimate"]["sigma_px"].get<double>(),
+                     document["estimate"]["sigma_px_from"].get<std::string>());
+  };
+  for (const double sigma_px : {0.2, 1.0, 2.0}) {
+    const std::string given = fmt::format("{}", sigma_px);
+    simulate({"--sigma-px", given, "--seed", "5"});
+    const auto [found_px, from] = sigma_of({});
+    EXPECT_NEAR(found_px, sigma_px, 0.15 * sigma_px + 0.05);
+    EXPECT_EQ(from, "residuals");
+    EXPECT_THAT(track({}).out, ::testing::HasSubstr(" px (estimated from the innovations)"));
+    EXPECT_EQ(sigma_of({"--sigma-px", given}), std::pair(sigma_px, std::string("given")));
+  }
+  simulate({"--seed", "5"});
+  EXPECT_EQ(sigma_of({}), std::pair(0.5, std::string("default")));
+}
+
 }  // namespace
 }  // namespace alidade

@@ -291,7 +291,7 @@ TEST_F(TrackCommand, SkipsBadRowsByName) {
 
 TEST_F(TrackCommand, SaysThatTheNoiseIsNotAsStated) {
   simulate("B", {"--sigma-px", "1.2"});
-  const Outcome outcome = track({"--json"});  // given 0.5 px
+  const Outcome outcome = track({"--json", "--sigma-px", "0.5"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json verdict = Json::parse(outcome.out)["verdict"];
   EXPECT_NE(verdict["state"], "good");

@@ -231,7 +231,7 @@ void add_track_scenario(App& app) {
           "--scenario", args->scenario,
           "A slow circle; A2 the same, heads with offsets and turned mountings; B fast circle; C manoeuvre; D C, "
           "hidden for a while; E B, images 100 ms late; F C, 100 ms late; G C, 20 and 30 images a second; "
-          "throw a ball thrown up and caught")
+          "throw a ball thrown up and caught; bounce a ball that bounces")
       ->capture_default_str();
   command.add_option("--path", args->path,
                      "Path of the target instead, from the first row on: t_s,x_m,y_m,z_m; after the last it rests");

@@ -91,6 +91,7 @@ FollowConfig follow_config(const TrackConfig& config, const Rig& rig) {
   TrackerConfig& tracker = follow.tracker;
   tracker.method = motion_of(config.method);
   follow.find_sigma_a = !config.sigma_a_m_s2;
+  follow.find_sigma_px = !config.sigma_px;
   tracker.sigma_a_m_s2 = config.sigma_a_m_s2.value_or(tracker.sigma_a_m_s2);
   tracker.sigma_px = config.sigma_px.value_or(tracker.sigma_px);
   tracker.gravity_m_s2 = config.gravity_m_s2.value_or(tracker.gravity_m_s2);
@@ -189,6 +190,7 @@ TargetTrack track(std::vector<TargetObservation> observations, Rig rig, const Tr
     follow.progress = progress;
     follow.tracker.history_s = std::max(follow.tracker.history_s, lateness_s(result.observations));
     static_cast<TrackReport&>(result) = track_target(result.observations, heads, follow, result.truth, watch);
+    follow.tracker.sigma_px = result.sigma_px;
     judge_track(follow, result);
   }
   result.counts.used = result.num_used;

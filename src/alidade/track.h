@@ -37,10 +37,10 @@ class TargetTracker {
   TargetTracker(TargetTracker&&) noexcept;
   TargetTracker& operator=(TargetTracker&&) noexcept;
 
-  /// What became of it. With `sigma_a_m_s2` given, the belief is that of the batch call on the same observations, whose
-  /// σ is increased at the end where the innovations require it, and which keeps out rows that repeat; without, 1 m/s²
-  /// is used until the end. Throws
-  /// ConfigError for an invalid observation, which is then not added.
+  /// What became of it. With `sigma_a_m_s2` and `sigma_px` given, the belief is that of the batch call on the same
+  /// observations, whose σ is increased at the end where the innovations require it, and which keeps out rows that
+  /// repeat; without, 1 m/s² and 0.5 px are used until the end. Throws ConfigError for an invalid observation, which is
+  /// then not added.
   TrackStep push(const TargetObservation& observation);
   /// Predicted state at a time. None before the track begins, before the newest observation, or with xiahou2015.
   [[nodiscard]] std::optional<PredictedStep> at(double t_s) const;

@@ -42,6 +42,7 @@ ServoTrack track_of(const ServoScene& scene, const ServoRun& run) {
     use_intrinsics_histories(histories_of(scene, run), track.observations, rig);
   FollowConfig config;
   config.tracker.sigma_px = scene.sigma_px;
+  config.find_sigma_px = false;
   config.tracker.sigma_encoder_rad = scene.sigma_encoder_rad;
   config.tracker.errors = scene.rig_errors.num() > 0 ? scene.rig_errors : rig_uncertainty(rig);
   config.warm_up_s = scene.warm_up_s;

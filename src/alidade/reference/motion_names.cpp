@@ -145,6 +145,8 @@ nis_per_dof         1    1 where the innovations are as predicted
 pcrlb_m             m    posterior Cramér–Rao bound
 sigma_a_m_s2        m/s² of the target's acceleration
 sigma_a_is_estimated flag from the innovations
+sigma_px            px    of a coordinate whose row states none
+sigma_px_from       text  residuals, given, rows (each states its own), or default (the innovations agree with it)
 restarts            count  tracks that began again
 rig_errors_counted  flag  the rig's covariance is in σ
 sigma_raised_by     1     by the rig's covariance

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -40,6 +41,14 @@ DataTable innovations_table(std::span<const RigHead> heads, const TrackReport& r
   return table;
 }
 
+/// Where σ of a pixel comes from.
+const char* sigma_px_source(const TargetTrack& track) {
+  const auto states_own = [](const TargetObservation& observation) { return observation.sigma_px > 0.0; };
+  if (!track.observations.empty() && std::ranges::all_of(track.observations, states_own)) return "rows";
+  if (track.sigma_px_is_found) return "residuals";
+  return track.config.sigma_px ? "given" : "default";
+}
+
 void fill_track(const TargetTrack& report, ResultDocument& document) {
   JsonValue& estimate = document.estimate;
   estimate["rms_m"] = report.rms_m;
@@ -50,6 +59,10 @@ void fill_track(const TargetTrack& report, ResultDocument& document) {
   estimate["pcrlb_m"] = report.pcrlb_m;
   estimate["sigma_a_m_s2"] = report.sigma_a_m_s2;
   estimate["sigma_a_is_estimated"] = report.sigma_a_is_found;
+  if (report.sigma_px > 0.0) {
+    estimate["sigma_px"] = report.sigma_px;
+    estimate["sigma_px_from"] = sigma_px_source(report);
+  }
   estimate["restarts"] = report.num_restarts;
   estimate["rig_errors_counted"] = report.errors_are_counted;
   estimate["sigma_raised_by"] = std::sqrt(report.inflation);
@@ -107,7 +120,7 @@ void fill_target_frames(std::span<const TargetFrame> frames, std::span<const Rig
   document.data.push_back(std::move(table));
 }
 
-void append_track_lines(const TrackReport& report, std::vector<std::string>& lines) {
+void append_track_lines(const TargetTrack& report, std::vector<std::string>& lines) {
   if (report.steps.empty() || !report.steps.back().has_belief) return;
   const TrackStep& last = report.steps.back();
   const std::array<const char*, 3> axes{"x", "y", "z"};
@@ -121,6 +134,8 @@ void append_track_lines(const TrackReport& report, std::vector<std::string>& lin
     lines.push_back(fmt::format("NIS per degree of freedom {:.2f}; the target's acceleration {:.2g} m/s² ({})",
                                 report.nis_per_dof, report.sigma_a_m_s2,
                                 report.sigma_a_is_found ? "estimated from the innovations" : "as given"));
+  if (report.sigma_px_is_found)
+    lines.push_back(fmt::format("σ of a pixel {:.2g} px (estimated from the innovations)", report.sigma_px));
   if (std::isfinite(report.rms_m))
     lines.push_back(fmt::format("against the truth: RMS {:.2f} mm, mean {:.2f} mm, NEES {:.2f}", 1e3 * report.rms_m,
                                 1e3 * report.mean_error_m, report.nees_per_dof));

@@ -61,7 +61,8 @@ FieldList sigma_fields(TrackConfig& config) {
        .limits = positive},
       {.name = "sigma_px",
        .value = &config.sigma_px,
-       .help = "σ of the target's pixel coordinate [px] (default 0.5)",
+       .help =
+           "σ of the target's pixel coordinate [px] (default: estimated from the innovations, 0.5 where they agree)",
        .limits = positive,
        .option = "--sigma-px"},
       {.name = "sigma_clock_s",

@@ -23,7 +23,7 @@ struct TrackConfig {
   std::optional<double> predict_s = {};              ///< Also a prediction so far ahead of each observation.
   std::optional<double> smooth_s = {};       ///< Also the path given the observations until so long after; not for imm.
   std::optional<double> sigma_a_m_s2 = {};   ///< The target's acceleration. None: estimated by the innovations.
-  std::optional<double> sigma_px = {};       ///< Of a pixel coordinate. None: 0.5.
+  std::optional<double> sigma_px = {};       ///< Of a pixel coordinate. None: 0.5, unless the innovations deny it.
   std::optional<double> sigma_clock_s = {};  ///< Of the delay between a head's clock and its images. None: exact.
   double sigma_angle_rad = 0.0008726646259971648;  ///< 0.05°; for heads whose encoder does not state its own.
   double min_depth_m = 0.2, max_depth_m = 20.0;    ///< The rig's working range, along a camera's view.

@@ -3,13 +3,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/track/checks/explanation.h"
 #include "alidade/track/checks/frozen_rows.h"
 #include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/checks/time_jitter.h"
 #include "alidade/track/checks/time_steps.h"
+#include "alidade/track/white_noise.h"
 #include "alidade/track/xiahou_tracker.h"
 
 namespace alidade {
@@ -79,24 +80,38 @@ TrackReport followed(std::span<const TargetObservation> observations, std::span<
   return report;
 }
 
+/// A σ, and ln p of the innovations with it.
+struct Probable {
+  double sigma = 0.0, log_likelihood = -std::numeric_limits<double>::infinity();
+};
+
+double ln_p(const TrackReport& report, double gate) {
+  if (report.num_starts == 0) return -std::numeric_limits<double>::infinity();
+  return report.log_likelihood - gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
+}
+
+/// A few minutes: enough to decide.
+std::span<const TargetObservation> first_of(std::span<const TargetObservation> observations) {
+  constexpr std::size_t max_observations = 4000;
+  return observations.first(std::min(observations.size(), max_observations));
+}
+
 /// The σ_a whose innovations are the most probable, from 0.03 to 30 m/s² in steps of a quarter of a decade.
-double max_probable_sigma_a(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                            TrackerConfig config, const Progress& progress) {
-  constexpr std::size_t max_observations = 4000;  // a few minutes: enough to decide
+Probable most_probable_sigma_a(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                               TrackerConfig config, const Progress& progress) {
   config.learn_errors = config.errors.num() > 0;  // the others' innovations follow one another
-  const auto first = observations.first(std::min(observations.size(), max_observations));
-  double best = config.sigma_a_m_s2, most = -std::numeric_limits<double>::infinity();
+  Probable best{.sigma = config.sigma_a_m_s2};
   for (int quarter = -6; quarter <= 6; ++quarter) {
     config.sigma_a_m_s2 = std::pow(10.0, 0.25 * quarter);
-    const TrackReport report = followed(first, heads, config, progress);
-    const double log_likelihood =
-        report.log_likelihood - config.gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
-    if (report.num_starts > 0 && log_likelihood > most) {
-      most = log_likelihood;
-      best = config.sigma_a_m_s2;
-    }
+    const double log_likelihood = ln_p(followed(first_of(observations), heads, config, progress), config.gate);
+    if (log_likelihood > best.log_likelihood) best = {config.sigma_a_m_s2, log_likelihood};
   }
   return best;
+}
+
+double max_probable_sigma_a(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                            const TrackerConfig& config, const Progress& progress) {
+  return most_probable_sigma_a(observations, heads, config, progress).sigma;
 }
 
 /// The observations that count in statistics: there is a belief, and the track is older than the warm-up.
@@ -176,6 +191,59 @@ std::vector<TargetObservation> as_captured(std::span<const TargetObservation> ob
   std::vector<TargetObservation> sorted(observations.begin(), observations.end());
   std::ranges::stable_sort(sorted, {}, [](const TargetObservation& s) { return std::pair(s.t_capture_s, s.head); });
   return sorted;
+}
+
+/// With the config's σ_px: its σ_a, found or given, and ln p with it.
+Probable probable_sigma_a(std::span<const TargetObservation> sorted, std::span<const RigHead> heads,
+                          const FollowConfig& config) {
+  if (config.find_sigma_a) return most_probable_sigma_a(sorted, heads, config.tracker, config.progress);
+  TrackerConfig learning = config.tracker;
+  learning.learn_errors = learning.errors.num() > 0;
+  return {learning.sigma_a_m_s2, ln_p(followed(first_of(sorted), heads, learning, config.progress), learning.gate)};
+}
+
+/// Of σ_px that the white part of the noise allows, the one whose innovations are the most probable. None where that
+/// part is as large as the config's σ_px says, or larger than that of a target which is found.
+std::optional<double> sigma_px_by_white(std::span<const TargetObservation> sorted, std::span<const RigHead> heads,
+                                        const FollowConfig& config, double compared_px, double& log_likelihood) {
+  constexpr double min_px = 0.2, max_px = 3.0, min_off = 3.0;  // what finders of targets reach, and what they need
+  constexpr int num_parts = 4;
+  const auto first = first_of(sorted);
+  const auto steps = followed(first, heads, config.tracker, config.progress).steps;
+  const auto white = white_noise(first, heads, steps, compared_px, config.tracker.sigma_encoder_rad);
+  if (!white || !(std::abs(white->off_in_sigma) > min_off) || white->sigma_px > max_px) return std::nullopt;
+  // What is not white is in no difference: where they are small, there may be more.
+  const double low_px = white->off_in_sigma < 0.0 ? white->sigma_px : white->low_px;
+  std::optional<double> best;
+  FollowConfig as_that = config;
+  for (int part = 0; part <= num_parts; ++part) {
+    const double share = static_cast<double>(part) / num_parts;
+    as_that.tracker.sigma_px = std::max(min_px, low_px + share * (white->high_px - low_px));
+    const double ln_p_of_that = probable_sigma_a(sorted, heads, as_that).log_likelihood;
+    if (best && !(ln_p_of_that > log_likelihood)) continue;
+    log_likelihood = ln_p_of_that;
+    best = as_that.tracker.sigma_px;
+  }
+  return best;
+}
+
+/// σ_px and σ_a where they are not given. The usual σ_px stays unless the white part of the noise says otherwise, and
+/// the innovations are then more probable: a rig that is wrong would ask for a larger one as well.
+void find_sigmas(std::span<const TargetObservation> sorted, std::span<const RigHead> heads, FollowConfig& config) {
+  constexpr double min_gain = 5.0;
+  const Probable usual = probable_sigma_a(sorted, heads, config);
+  const double usual_px = config.tracker.sigma_px;
+  config.tracker.sigma_a_m_s2 = usual.sigma;
+  if (!config.find_sigma_px) return;
+  FollowConfig found = config;
+  for (int again = 0; again < 2; ++again) {  // with the σ of the first, observations count that were rejected
+    double log_likelihood = 0.0;
+    const auto sigma_px = sigma_px_by_white(sorted, heads, found, usual_px, log_likelihood);
+    if (!sigma_px || !(log_likelihood > usual.log_likelihood + min_gain)) return;
+    found.tracker.sigma_px = *sigma_px;
+    found.tracker.sigma_a_m_s2 = probable_sigma_a(sorted, heads, found).sigma;
+  }
+  config.tracker = found.tracker;
 }
 
 /// NIS of the counted steps, per degree of freedom.
@@ -263,13 +331,16 @@ TrackReport track_target(std::span<const TargetObservation> observations, std::s
     used.kept_out = rows_of(frozen, observations);
   }
   const std::vector<TargetObservation> others = without_kept_out(observations, used.kept_out);
-  if (config.find_sigma_a)
-    used.tracker.sigma_a_m_s2 = max_probable_sigma_a(as_captured(others), heads, config.tracker, config.progress);
+  const bool states_own = std::ranges::all_of(others, [](const TargetObservation& o) { return o.sigma_px > 0.0; });
+  used.find_sigma_px = config.find_sigma_px && config.judge && !states_own && !coarse_readings(others, heads, config);
+  if (used.find_sigma_a || used.find_sigma_px) find_sigmas(as_captured(others), heads, used);
   used.tracker = with_history(used);
   TrackReport report = followed(observations, heads, used.tracker, config.progress,
                                 {config.predict_s, config.smooth_s, used.kept_out, watch});
   report.frozen = std::move(frozen);
   report.sigma_a_is_found = config.find_sigma_a;
+  report.sigma_px = used.tracker.sigma_px;
+  report.sigma_px_is_found = used.tracker.sigma_px != config.tracker.sigma_px;
   const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
   if (config.judge) {
     judge_observations(others, heads, used, report);
@@ -301,38 +372,6 @@ TrackReport track_target_xiahou(std::span<const TargetObservation> observations,
   if (report.num_starts > 0) report.status = TrackReport::Status::tracked;
   if (!truth.t_s.empty()) add_errors(report, counted(report.steps, FollowConfig{}.warm_up_s), truth, {});
   return report;
-}
-
-std::vector<double> track_bound(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                                const FollowConfig& config, const TrueTrack& truth) {
-  std::vector<std::size_t> order(observations.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return observations[i].t_capture_s; });
-  const ConstantVelocity motion{config.tracker.sigma_a_m_s2};
-  Belief<6> belief;
-  belief.P.topLeftCorner<3, 3>() *= config.tracker.start_sigma_m * config.tracker.start_sigma_m;
-  belief.P.bottomRightCorner<3, 3>() *= config.tracker.start_sigma_v_m_s * config.tracker.start_sigma_v_m_s;
-  std::vector<double> sigma_m(observations.size(), not_there);
-  double now_s = order.empty() ? 0.0 : observations[order.front()].t_capture_s;
-  for (const std::size_t i : order) {
-    const TargetObservation& observation = observations[i];
-    belief = motion.predicted(belief, observation.t_capture_s - now_s);
-    now_s = observation.t_capture_s;
-    const auto position = truth.at(now_s);
-    if (position && observation.head < heads.size()) {
-      const RigHead& head = heads[observation.head];
-      const double own = head.head.encoder.sigma_rad;
-      const ObservationModel see(head, observation.pan_tilt_rad, sigma_px_of(observation, config.tracker.sigma_px),
-                                 own > 0.0 ? own : config.tracker.sigma_encoder_rad, observation.lens);
-      belief.x.head<3>() = *position;
-      if (const auto seen = see(*position)) {
-        const auto updated = iterated_update(belief, *seen, seen->z, see, {.max_iterations = 1});
-        if (updated) belief = *updated;
-      }
-    }
-    sigma_m[i] = std::sqrt(belief.P.topLeftCorner<3, 3>().trace());
-  }
-  return sigma_m;
 }
 
 }  // namespace alidade

@@ -85,6 +85,8 @@ struct TrackReport {
   Status status = Status::no_start;
   double sigma_a_m_s2 = 0.0;
   bool sigma_a_is_found = false;
+  double sigma_px = 0.0;                ///< Of observations that state none; 0: of a method that has none.
+  bool sigma_px_is_found = false;       ///< From the innovations.
   std::vector<TrackStep> steps;         ///< One per observation, in their order.
   std::vector<PredictedStep> ahead;     ///< One per step, or none.
   std::vector<PredictedStep> smoothed;  ///< In order of time, one per capture time that can be smoothed; else none.

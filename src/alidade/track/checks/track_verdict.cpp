@@ -95,11 +95,17 @@ void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdic
                                    std::sqrt(report.inflation), 1.0, "1"));
 }
 
-Check nis_check(double nis) {
+Check nis_check(const TrackReport& report) {
+  const double nis = report.nis_per_dof;
   const bool is_good = nis >= good_nis_low && nis <= good_nis_high;
-  const std::string text = nis > good_nis_high  ? "noise is larger than stated, or the rig is wrong"
-                           : nis < good_nis_low ? "noise is smaller than stated"
-                                                : "innovations as large as predicted";
+  const std::string stated =
+      report.sigma_px_is_found ? "the " + text_of(report.sigma_px, 2) + " px estimated from it" : "stated";
+  const std::string text = nis > good_nis_high  ? "noise is larger than " + stated + ", or the rig is wrong"
+                           : nis < good_nis_low ? "noise is smaller than " + stated
+                           : report.sigma_px_is_found
+                               ? "innovations as large as predicted with noise of " + text_of(report.sigma_px, 2) +
+                                     " px, which is estimated from them"
+                               : "innovations as large as predicted";
   return check("NIS",
                is_good         ? State::good
                : nis > max_nis ? State::bad
@@ -119,7 +125,7 @@ Check truth_check(const TrackReport& report) {
 }
 
 void add_checks(const TrackReport& report, Verdict& verdict) {
-  if (std::isfinite(report.nis_per_dof)) verdict.checks.push_back(nis_check(report.nis_per_dof));
+  if (std::isfinite(report.nis_per_dof)) verdict.checks.push_back(nis_check(report));
   if (std::isfinite(report.nees_per_dof)) verdict.checks.push_back(truth_check(report));
   const auto num_alone = static_cast<double>(count(report, TrackEvent::one_head));
   const double alone = num_alone / static_cast<double>(report.steps.size());
@@ -214,7 +220,9 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   if (causes.shift && causes.shift->is_worse_than_rival() && !alike_per_head(report).empty()) causes.shift.reset();
   if (is_explained || is_jitter) return causes;
   causes.second = second_target(report, observations, heads, found);
-  if (report.num_restarts > 0 || report.nis_per_dof > good_nis_high)
+  constexpr double half_gravity_m_s2 = 5.0;  // a target that falls asks for as much, also below larger noise
+  const bool may_fall = report.sigma_px_is_found && report.sigma_a_m_s2 > half_gravity_m_s2;
+  if (report.num_restarts > 0 || report.nis_per_dof > good_nis_high || may_fall)
     causes.falls = falling_target(observations, heads, config);
   return causes;
 }
@@ -380,9 +388,12 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   for (const TargetObservation& observation : observations) seen_by.insert(observation.head);
   if (seen_by.size() < 2)
     return refused({"one head only: the range along its ray cannot be determined", "add the events of a second head"});
-  if (report.frozen.empty()) return verdict_of(report, observations, heads, config, report.steps.size());
+  FollowConfig used = config;
+  used.find_sigma_px = false;
+  if (report.sigma_px_is_found) used.tracker.sigma_px = report.sigma_px;
+  if (report.frozen.empty()) return verdict_of(report, observations, heads, used, report.steps.size());
   const Followed followed(report, observations);
-  return verdict_of(followed.report, followed.observations, heads, config, report.steps.size());
+  return verdict_of(followed.report, followed.observations, heads, used, report.steps.size());
 }
 
 }  // namespace alidade

@@ -58,7 +58,7 @@ TEST(TrackVerdict, NoiseThatIsLargerThanStatedRaisesSigma) {
   const std::vector<TargetObservation> observations = testing::observations_of(scene, 3);
   FollowConfig config;
   config.tracker.sigma_px = 0.5;
-  config.find_sigma_a = false;
+  config.find_sigma_a = config.find_sigma_px = false;
   config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
   const TrackReport report = track_target(observations, scene.heads, config, testing::truth_of(scene));
   EXPECT_GT(report.inflation, 2.0);  // the noise's variance is 4 times the one stated

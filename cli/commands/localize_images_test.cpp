@@ -140,14 +140,16 @@ TEST_F(LocalizeImageFolders, ATruthOfOtherTimesIsRefused) {
   expect_refused("sim/frames", {"--rate", "30"}, 3, "2 of 12 frames have a pose of their time in it, 3 are needed");
 }
 
-/// Clean rendered images are matched better than real ones: the verdict says so, and what to tell.
-TEST_F(LocalizeImageFolders, TheLeastSigmaOfAMatchCanBeGiven) {
+/// Clean rendered images are matched better than real ones, whose least σ is 0.11 px: σ is that of what is left over,
+/// unless it is given.
+TEST_F(LocalizeImageFolders, TheLeastSigmaOfAMatchIsFoundOrGiven) {
   const Json usual = Json::parse(localize("sim/frames", {"--rate", "30"}).out),
-             given = Json::parse(localize("sim/frames", {"--rate", "30", "--sigma-px", "0.03"}).out);
-  EXPECT_EQ(usual["estimate"]["sigma_px"], 0.11);
-  EXPECT_EQ(given["estimate"]["sigma_px"], 0.03);
-  EXPECT_GT(given["estimate"]["nis_per_dof"].get<double>(), 2.0 * usual["estimate"]["nis_per_dof"].get<double>());
-  EXPECT_NE(usual["verdict"]["sentence"].get<std::string>().find("--sigma-px"), std::string::npos);
+             given = Json::parse(localize("sim/frames", {"--rate", "30", "--sigma-px", "0.11"}).out);
+  EXPECT_LT(usual["estimate"]["sigma_px"], 0.08);
+  EXPECT_GT(usual["estimate"]["sigma_px"], 0.02);
+  EXPECT_EQ(given["estimate"]["sigma_px"], 0.11);
+  EXPECT_LT(given["estimate"]["nis_per_dof"].get<double>(), 0.5 * usual["estimate"]["nis_per_dof"].get<double>());
+  EXPECT_NE(given["verdict"]["sentence"].get<std::string>().find("--sigma-px"), std::string::npos);
 }
 
 /// Some images are missing, some are black: the path goes on, and does not call itself good.

@@ -139,7 +139,7 @@ class Jobs(InFolder):
                             (lambda: al.observe({"t": [0.0], "pan": ["x"], "tilt": [0.0], "p1x": [1.0], "p1y": [1.0]}), "log:2"),
                             (lambda: al.observe("-", size=(1, 1)), "is no file"),
                             (lambda: al.track("e.csv", rig="r.yaml", method="cw"), "cw"),
-                            (lambda: al.track("e.csv", rig="r.yaml", sigma_px=-1.0), "sigma-px"),
+                            (lambda: al.track("e.csv", rig="r.yaml", sigma_px=-1.0), "sigma_px"),
                             (lambda: al.servo(object()), "scenario")):
             with self.subTest(words=words), self.assertRaises(ValueError) as caught:
                 work()

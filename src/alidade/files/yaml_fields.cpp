@@ -173,7 +173,8 @@ void refuse_impossible(const Eigen::MatrixXd& cov, const std::vector<std::string
                          known[static_cast<std::size_t>(i)], known[static_cast<std::size_t>(j)]));
     }
   }
-  if (!is_covariance(cov))
+  constexpr double of_digits = 1e-6;  // that were cut off
+  if (!is_covariance(cov, of_digits))
     refuse(fields.file(), fields.full("upper"), "is not a covariance: an eigenvalue is below zero");
 }
 

@@ -6,8 +6,7 @@
 
 namespace alidade {
 
-bool is_covariance(const Eigen::MatrixXd& cov) {
-  constexpr double rounding = 1e-4;  // of correlations that a file rounds
+bool is_covariance(const Eigen::MatrixXd& cov, double rounding) {
   if (cov.size() == 0) return true;
   if (cov.rows() != cov.cols() || !cov.allFinite() || cov.diagonal().minCoeff() < 0.0) return false;
   const Eigen::VectorXd scale =

@@ -77,7 +77,7 @@ function stepsOf(doc: Doc): Table | null {
 }
 
 export const trackSpace: Figure = {
-  id: 'path', title: 'Where did the target go?', note: 'base frame, m · click a time axis for the rays of an instant', span: 12,
+  id: 'path', title: 'Where did the target go?', note: 'world frame, m · click a time axis for the rays of an instant', span: 12,
   draw(host, doc, selection) {
     const steps = stepsOf(doc);
     if (!steps) return null;

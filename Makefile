@@ -59,8 +59,8 @@ test:
 	@cmake --preset release -DALIDADE_TESTS=ON >/dev/null
 	@tools/setup test & setup=$$!; ninja -C $(out) $(jobs) || { wait $$setup; exit 1; }; wait $$setup
 	@echo "test: running them"
-	@# Two more than there are cores: those that drive a browser or a simulated head wait most of the time.
-	@ctest --test-dir $(out) --output-on-failure --parallel $$(($$(nproc) + 2))
+	@# Three more than there are cores: those that drive a browser, a simulated head or a broker wait most of the time.
+	@ctest --test-dir $(out) --output-on-failure --parallel $$(($$(nproc) + 3))
 	@tools/skipped_tests $(out)
 
 bench:

@@ -266,7 +266,7 @@ TEST(Localize, AWrongPathIsNeverGood) {
   EXPECT_EQ(verdict_of(sample.camera, sample.config).state, State::good);
   const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
   EXPECT_GE(verdict_of(*pinhole, sample.config).state, State::care);
-  constexpr std::size_t num_frames = 15;  // what contradicts itself begins again in most frames: that takes its time
+  constexpr std::size_t num_frames = 8;  // what contradicts itself begins again in most frames: that takes its time
   sample.frames.resize(num_frames);
   sample.truth.resize(num_frames);
   LocalizeConfig sure = sample.config;

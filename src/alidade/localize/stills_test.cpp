@@ -3,6 +3,7 @@
 #include "alidade/localize.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/testing/hover.h"
+#include "alidade/testing/trials.h"
 
 // Stills of a target: the camera comes from one to the next by no motion that a filter would expect.
 
@@ -47,7 +48,7 @@ TEST(Stills, EachIsWhereItsTargetSays) {
       {-0.105, -0.075, 0.0}, {0.105, -0.075, 0.0}, {0.105, 0.075, 0.0}, {-0.105, 0.075, 0.0}};
   for (const int num_others : {0, 40}) {
     for (const double dt_s : {1.0, 1.0 / 30.0}) {
-      for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+      for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(testing::trials(1)); ++seed) {
         std::vector<Eigen::Vector3d> points = corners;
         Draws draws(50 + seed);
         for (int i = 0; i < num_others; ++i)

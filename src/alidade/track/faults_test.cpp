@@ -87,7 +87,7 @@ bool says_one_of(const std::string& sentence, std::string words) {
 }
 
 TEST(TrackFaults, AreNamedAndNeverCalledGood) {
-  const int draws = testing::trials(4);
+  const int draws = testing::trials(3);
   for (const char* scenario : {"B", "G"}) {
     for (const FaultCase& of : fault_cases()) {
       const TrackScene scene = faulty(scenario, of.fault);

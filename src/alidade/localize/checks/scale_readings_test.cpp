@@ -8,6 +8,7 @@
 
 #include "alidade/localize.h"
 #include "alidade/testing/long_walk.h"
+#include "alidade/testing/trials.h"
 
 // Metres without a target: a pressure sensor's depths, a rangefinder's readings.
 
@@ -65,7 +66,7 @@ const Localization& by_camera(std::uint64_t seed) {
 double true_scale_of(std::uint64_t seed) { return by_camera(seed).error.scale; }
 
 TEST(SensorScale, ADepthSensorGivesMetres) {
-  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(testing::trials(1)); ++seed) {
     const WalkRun run = long_walk(swimming(), seed);
     LocalizeConfig config;
     config.sigma_depth_sensor = 1e-4;  // the readings' own σ is what is asked

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alidade/testing/imu_run.h"
+#include "alidade/testing/trials.h"
 
 // An IMU whose biases drift, or whose clock runs fast.
 
@@ -41,7 +42,7 @@ TEST(ImuDrift, OfAnImuAsItShouldBeNothingIsNamed) {
 
 /// An accelerometer that warms up by 0.015 m/s³ bent paths by up to 8σ at ●.
 TEST(ImuDrift, ABiasThatDriftsIsEstimatedAndNamed) {
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(testing::trials(2)); ++seed) {
     for (const bool is_of_rates : {false, true}) {
       ImuRun run = recorded(seed);
       for (ImuReading& each : run.imu.readings)

@@ -30,6 +30,7 @@ std::string fault_of(const std::string& line) {
 
 TEST(BoardOptions, DescribeEveryKind) {
   EXPECT_EQ(parse("--board 9x6 --square 0.025"), (Board{BoardKind::chessboard, 9, 6, 0.025, 0.0, ""}));
+  EXPECT_EQ(parse("--board 9×6 --square 0.025"), (Board{BoardKind::chessboard, 9, 6, 0.025, 0.0, ""}));
   EXPECT_EQ(parse("--board 8X5 --square 0.03 --target charuco --marker 0.022 --dictionary DICT_4X4_50"),
             (Board{BoardKind::charuco, 8, 5, 0.03, 0.022, "DICT_4X4_50"}));
   EXPECT_EQ(parse("--board 6x6 --square 0.088 --target aprilgrid --marker 0.0264"),

@@ -177,9 +177,12 @@ TextCode length_code(double& value_m, double min_m, double max_m) {
 TextCode pair_code(int& first, int& second, int max, const std::string& example, int min) {
   TextCode code;
   code.read = [&first, &second, max, min, example](const std::string& text) -> std::string {
-    const std::size_t cross = text.find_first_of("xX");
+    constexpr std::string_view sign = "×";  // as sentences write it
+    const bool is_sign = text.find(sign) != std::string::npos;
+    const std::size_t cross = is_sign ? text.find(sign) : text.find_first_of("xX");
     const auto a = number_of<int>(text.substr(0, cross));
-    const auto b = cross == std::string::npos ? std::nullopt : number_of<int>(text.substr(cross + 1));
+    const auto b = cross == std::string::npos ? std::nullopt
+                                              : number_of<int>(text.substr(cross + (is_sign ? sign.size() : 1)));
     if (!a || !b || *a < min || *b < min || *a > max || *b > max) return quoted(text) + " is not " + example;
     first = *a;
     second = *b;

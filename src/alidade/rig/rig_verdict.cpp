@@ -364,7 +364,8 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   }
   const auto num = report.rig.heads.size();
   verdict.sentence = std::to_string(num) + (num == 1 ? " head" : " heads") + " from " +
-                     std::to_string(report.views_used) + " views, camera to camera ± " +
+                     std::to_string(report.views_used) +
+                     (num == 1 ? " views, camera after a rotation ± " : " views, camera to camera ± ") +
                      text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
                      text_of(3e3 * report.sigma_relative_m, 2) + " mm (3σ)";
   heed_assumptions(report.assumed, verdict);

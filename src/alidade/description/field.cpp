@@ -181,8 +181,8 @@ TextCode pair_code(int& first, int& second, int max, const std::string& example,
     const bool is_sign = text.find(sign) != std::string::npos;
     const std::size_t cross = is_sign ? text.find(sign) : text.find_first_of("xX");
     const auto a = number_of<int>(text.substr(0, cross));
-    const auto b = cross == std::string::npos ? std::nullopt
-                                              : number_of<int>(text.substr(cross + (is_sign ? sign.size() : 1)));
+    const auto b =
+        cross == std::string::npos ? std::nullopt : number_of<int>(text.substr(cross + (is_sign ? sign.size() : 1)));
     if (!a || !b || *a < min || *b < min || *a > max || *b > max) return quoted(text) + " is not " + example;
     first = *a;
     second = *b;

@@ -1,10 +1,13 @@
 #include "alidade/network/clock_search.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
+#include <vector>
 
 namespace alidade {
 namespace {
@@ -63,27 +66,39 @@ std::optional<ObservationPair> agreeing_offset(std::span<const ObservationSeries
                                                std::size_t second, double search_s, const Progress& progress) {
   constexpr double coarse_s = 0.25, fine_s = 0.05;
   const auto steps = static_cast<int>(std::ceil(search_s / coarse_s));
-  std::vector<ObservationPair> coarse;
-  for (int k = -steps; k <= steps; ++k) {
-    coarse.push_back(agreement(series, first, second, coarse_s * k, 140, 40));
-    report_progress(progress, "clocks", static_cast<std::size_t>(k + steps), static_cast<std::size_t>(2 * steps + 1));
+  std::vector<double> offsets_s;
+  for (int k = -steps; k <= steps; ++k) offsets_s.push_back(coarse_s * k);
+  std::vector<ObservationPair> coarse(offsets_s.size());
+  constexpr std::size_t at_once = 32;  // between reports of progress
+  for (std::size_t begin = 0; begin < coarse.size(); begin += at_once) {
+    const std::size_t end = std::min(begin + at_once, coarse.size());
+    tbb::parallel_for(begin, end,
+                      [&](std::size_t i) { coarse[i] = agreement(series, first, second, offsets_s[i], 140, 40); });
+    report_progress(progress, "clocks", end - 1, coarse.size());
   }
   // Few samples can miss the best geometry: the best few offsets are looked at again.
   constexpr std::size_t max_again = 6;
   const auto again = coarse.begin() + static_cast<std::ptrdiff_t>(std::min(max_again, coarse.size()));
   std::ranges::partial_sort(coarse, again, std::greater{}, strength);
   ObservationPair best{first, second, 0.0, -1.0, 0};
-  const auto consider = [&](double offset_s) {
-    const ObservationPair pair = agreement(series, first, second, offset_s, 300, 300);
-    if (strength(pair) > strength(best)) best = pair;
+  const auto consider = [&](const std::vector<double>& each_s) {
+    std::vector<ObservationPair> pairs(each_s.size());
+    tbb::parallel_for(std::size_t{0}, pairs.size(),
+                      [&](std::size_t i) { pairs[i] = agreement(series, first, second, each_s[i], 300, 300); });
+    for (const ObservationPair& pair : pairs)
+      if (strength(pair) > strength(best)) best = pair;
   };
+  offsets_s.clear();
   for (auto one = coarse.begin(); one != again; ++one)
-    if (one->num_common >= min_common) consider(one->offset_s);
+    if (one->num_common >= min_common) offsets_s.push_back(one->offset_s);
+  consider(offsets_s);
   if (best.num_common < min_common) return std::nullopt;
   const double centre_s = best.offset_s;
   const int around = steps > 0 ? static_cast<int>(std::round(0.6 * coarse_s / fine_s)) : 0;
+  offsets_s.clear();
   for (int k = -around; k <= around; ++k)
-    if (k != 0) consider(centre_s + fine_s * k);
+    if (k != 0) offsets_s.push_back(centre_s + fine_s * k);
+  consider(offsets_s);
   return best;
 }
 

@@ -1,6 +1,7 @@
 #include "alidade/localize.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
 #include "alidade/localize/frames/image_localizer.h"
+#include "alidade/localize/frames/white_pixels.h"
 #include "alidade/localize/map/map_frame.h"
 #include "alidade/localize/map/moved_points.h"
 #include "alidade/localize/observation_localizer.h"
@@ -63,7 +65,28 @@ Localization described(const LocalizeConfig& config, const Camera& camera) {
   result.scale_known = config.map ? config.map->is_in_metres : result.has_target;
   result.is_scale_given = config.target.is_scale_given;
   result.sigma_px = config.filter.sigma_px;
+  if (config.sigma_px) result.sigma_px_from = SigmaPxFrom::given;
   return result;
+}
+
+/// Whether σ of a pixel is for the observations to say.
+bool seeks_sigma(const LocalizeConfig& config) {
+  return !config.sigma_px && config.filter.sigma_px == LocalizationFilterConfig{}.sigma_px;
+}
+
+/// Whether innovations of a path that was solved with the usual σ are as small as a smaller one would have them. Errors
+/// that last are in no difference of few frames: where they are the larger ones the smaller σ is none.
+bool suggests(const Localization& result, double smaller_px) {
+  constexpr double generous = 1.7, of_motion = 0.1;  // a motion that is trusted more than such pixels bends less
+  return result.nis_per_dof < generous * std::pow(smaller_px / result.sigma_px, 2) + of_motion;
+}
+
+/// Whether a path that was solved with a found σ stands: what is left of it is such noise.
+bool bears_out(const Localization& result, bool is_larger) {
+  constexpr double least_nis = 0.4, most_nis = 1.5;
+  const State state = result.verdict.state;
+  if (state == State::refused || state == State::not_converged) return false;
+  return is_larger ? result.nis_per_dof > least_nis : result.nis_per_dof < most_nis;
 }
 
 }  // namespace
@@ -75,7 +98,9 @@ struct Localizer::Run {
   std::optional<ObservationLocalizer> of_observations;
   std::optional<ImageLocalizer> of_images;
   std::vector<PathStep> path;
-  std::size_t num_judged = 0;                ///< Of them, by recent().
+  std::size_t num_judged = 0;  ///< Of them, by recent().
+  bool seeks_sigma_px = false, sigma_px_is_found = false;
+  std::vector<ObservationFrame> given = {};  ///< For that; of a longer recording none.
   std::optional<MovedMapPoints> moved = {};  ///< Of the map that an earlier run has left, and not in this one's.
 
   [[nodiscard]] double last_t_s() const {
@@ -86,6 +111,23 @@ struct Localizer::Run {
     if (moved) return *moved;
     if (!of_observations || !config.map) return {};
     return moved_map_points(camera, of_observations->numbered_frames(), *config.map, config.filter.sigma_px);
+  }
+  /// The config for the same frames once more.
+  [[nodiscard]] LocalizeConfig again() const {
+    LocalizeConfig once_more = config;
+    if (once_more.map) once_more.target.points.clear();
+    once_more.watch = {};
+    once_more.inspect = {};
+    once_more.seconds = {};
+    return once_more;
+  }
+  void keep(const ObservationFrame& frame) {
+    if (!seeks_sigma_px) return;
+    seeks_sigma_px = path.size() < static_cast<std::size_t>(config.max_smoothed);
+    if (seeks_sigma_px)
+      given.push_back(frame);
+    else
+      given = {};
   }
   template <typename Take>
   const PathStep& timed(const Take& take) {
@@ -98,7 +140,8 @@ struct Localizer::Run {
 
 Localizer::Localizer(const Camera& camera, const LocalizeConfig& config) {
   require_sense(config, camera);
-  run_ = std::make_unique<Run>(Run{known_camera(camera, config), config, {}, {}, {}, 0, {}});
+  run_ = std::make_unique<Run>(
+      Run{known_camera(camera, config), config, {}, {}, {}, 0, seeks_sigma(config), false, {}, {}});
 }
 
 Localizer::~Localizer() = default;
@@ -113,6 +156,7 @@ const PathStep& Localizer::push(const ObservationFrame& frame) {
     run.config = resolved(std::move(run.config), run.camera, false);
     run.of_observations.emplace(run.camera, run.config);
   }
+  run.keep(frame);
   const PathStep& step = run.timed([&] { return run.of_observations->take(frame); });
   if (run.config.watch) run.config.watch(step);
   return step;
@@ -149,14 +193,12 @@ std::optional<Localization> Localizer::finished_without(MovedMapPoints moved, st
   const Run& run = *run_;
   const std::vector<ObservationFrame> frames = run.of_observations->numbered_frames();
   if (frames.size() != run.path.size()) return std::nullopt;
-  LocalizeConfig config = run.config;
-  config.target.points.clear();
+  LocalizeConfig config = run.again();
   std::erase_if(config.map->points,
                 [&](const SavedPoint& point) { return std::ranges::binary_search(moved.ids, point.id); });
-  config.watch = {};
-  config.inspect = {};
-  config.seconds = {};
   Localizer again(run.camera, config);
+  again.run_->seeks_sigma_px = false;
+  again.run_->sigma_px_is_found = run.sigma_px_is_found;
   again.run_->moved = std::move(moved);
   for (const ObservationFrame& frame : frames) again.push(frame);
   for (std::size_t k = 0; k < frames.size(); ++k) again.run_->path[k].seconds = run.path[k].seconds;
@@ -166,13 +208,61 @@ std::optional<Localization> Localizer::finished_without(MovedMapPoints moved, st
   return result;
 }
 
+std::optional<Localization> Localizer::by_found_sigma(double found_px, std::span<const ObservationFrame> frames,
+                                                      LocalizeConfig config, std::span<const TimedPose> truth,
+                                                      const Progress& progress) const {
+  const bool is_larger = found_px > config.filter.sigma_px;
+  config.sigma_px = found_px;
+  Localizer again(run_->camera, config);
+  again.run_->sigma_px_is_found = true;
+  again.push_all(frames, progress);
+  Localization result = again.finish(truth);
+  if (!bears_out(result, is_larger)) return std::nullopt;
+  return result;
+}
+
+/// With the σ of a pixel that the frames show, where that is another one.
+Localization Localizer::with_sigma_sought(std::span<const ObservationFrame> frames, LocalizeConfig config,
+                                          std::span<const TimedPose> truth, const Progress& progress,
+                                          const std::function<Localization()>& by_usual) const {
+  const double usual_px = config.filter.sigma_px;
+  const auto other_px = other_sigma_px(frames, run_->camera, usual_px);
+  if (!other_px) return by_usual();
+  if (*other_px > usual_px)
+    if (auto larger = by_found_sigma(*other_px, frames, config, truth, progress)) return *std::move(larger);
+  Localization usual = by_usual();
+  if (*other_px > usual_px || !suggests(usual, *other_px)) return usual;
+  config.watch = {};
+  config.inspect = {};
+  if (auto smaller = by_found_sigma(*other_px, frames, std::move(config), truth, progress)) return *std::move(smaller);
+  return usual;
+}
+
+void Localizer::push_all(std::span<const ObservationFrame> frames, const Progress& progress) {
+  std::size_t done = 0;
+  for (const ObservationFrame& frame : frames) {
+    report_progress(progress, "localize", done++, frames.size());
+    push(frame);
+  }
+}
+
 Localization Localizer::finish(std::span<const TimedPose> truth) const {
   require_sense(truth);
+  const Run& run = *run_;
+  if (run.given.empty()) return finished(truth);
+  Localization result = with_sigma_sought(run.given, run.again(), truth, {}, [this, truth] { return finished(truth); });
+  for (std::size_t k = 0; k < run.path.size(); ++k) result.path[k].seconds = run.path[k].seconds;
+  return result;
+}
+
+/// With the σ of a pixel that push() has.
+Localization Localizer::finished(std::span<const TimedPose> truth) const {
   const Run& run = *run_;
   const MovedMapPoints moved = run.moved_points();
   if (!moved.ids.empty() && !run.moved)
     if (auto without = finished_without(moved, truth)) return *std::move(without);
   Localization result = described(run.config, run.camera);
+  if (run.sigma_px_is_found) result.sigma_px_from = SigmaPxFrom::residuals;
   result.path = run.path;
   result.truth.assign(truth.begin(), truth.end());
   for (const int index : run.config.filter.lens_params)
@@ -210,12 +300,14 @@ Localization localize(std::span<const ObservationFrame> frames, const Camera& ca
                       std::span<const TimedPose> truth, const Progress& progress) {
   require_sense(truth);
   Localizer localizer(camera, sized(config, frames));
-  std::size_t done = 0;
-  for (const ObservationFrame& frame : frames) {
-    report_progress(progress, "localize", done++, frames.size());
-    localizer.push(frame);
-  }
-  return localizer.finish(truth);
+  const auto solve = [&] {
+    localizer.push_all(frames, progress);
+    return localizer.finish(truth);
+  };
+  if (!std::exchange(localizer.run_->seeks_sigma_px, false)) return solve();
+  for (double last_t_s = std::numeric_limits<double>::quiet_NaN(); const ObservationFrame& frame : frames)
+    require_sense(frame, std::exchange(last_t_s, frame.t_s));
+  return localizer.with_sigma_sought(frames, localizer.run_->config, truth, progress, solve);
 }
 
 Localization localize(const ObservationTable& observations, const Camera& camera, const LocalizeConfig& config,

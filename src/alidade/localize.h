@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -19,7 +20,7 @@ ALIDADE_PUBLIC_BEGIN
 
 /// From observations of numbered points, frames in order of time. Throws ConfigError for an invalid config,
 /// camera or frame, Interrupted where `progress` returns false; never for what the observations show. With `truth` the
-/// result has the path's error.
+/// result has the path's error. Where the config says no σ of a pixel, it is estimated first, from all frames.
 [[nodiscard]] Localization localize(const ObservationTable& observations, const Camera& camera,
                                     const LocalizeConfig& config = {}, std::span<const TimedPose> truth = {},
                                     const Progress& progress = {});
@@ -31,8 +32,9 @@ ALIDADE_PUBLIC_BEGIN
 [[nodiscard]] Localization localize(const ImageStream& images, const Camera& camera, const LocalizeConfig& config = {},
                                     std::span<const TimedPose> truth = {}, const Progress& progress = {});
 
-/// The same, incrementally, frame by frame. push() returns the filter's pose; finish() returns what localize() returns
-/// for the same frames, to the last digit.
+/// The same, incrementally, frame by frame. push() returns the filter's pose, with 0.5 px where the config says no σ of
+/// a pixel; finish() returns what localize() returns for the same frames, to the last digit (of more than
+/// config.max_smoothed, with the σ that push() has).
 class Localizer {
  public:
   /// Throws ConfigError.
@@ -54,6 +56,17 @@ class Localizer {
   struct Run;
   [[nodiscard]] std::optional<Localization> finished_without(MovedMapPoints moved,
                                                              std::span<const TimedPose> truth) const;
+  void push_all(std::span<const ObservationFrame> frames, const Progress& progress);
+  [[nodiscard]] Localization finished(std::span<const TimedPose> truth) const;
+  [[nodiscard]] std::optional<Localization> by_found_sigma(double found_px, std::span<const ObservationFrame> frames,
+                                                           LocalizeConfig config, std::span<const TimedPose> truth,
+                                                           const Progress& progress) const;
+  [[nodiscard]] Localization with_sigma_sought(std::span<const ObservationFrame> frames, LocalizeConfig config,
+                                               std::span<const TimedPose> truth, const Progress& progress,
+                                               const std::function<Localization()>& by_usual) const;
+  friend Localization localize(std::span<const ObservationFrame> frames, const Camera& camera,
+                               const LocalizeConfig& config, std::span<const TimedPose> truth,
+                               const Progress& progress);
   std::unique_ptr<Run> run_;
 };
 

@@ -30,8 +30,9 @@ FieldList sigma_fields(LocalizeConfig& config) {
       {.name = "sigma_depth", .value = &config.sigma_depth, .help = "σ of that depth, relative", .limits = positive},
       {.name = "sigma_px",
        .value = &config.sigma_px,
-       .help = "σ of a pixel coordinate (default 0.5); in images, where each match brings its own, the least (default "
-               "0.11) [px]",
+       .help =
+           "σ of a pixel coordinate (default: of a table estimated from its tracks, 0.5 where they agree); in images, "
+           "where each match brings its own, the least (default 0.11) [px]",
        .limits = positive,
        .option = "--sigma-px"},
       {.name = "sigma_scale",

@@ -126,10 +126,12 @@ struct LocalizeConfig {
   DistortionVariant distortion = DistortionVariant::full;
   bool calibrate_online = false;  ///< fx fy cx cy k1 k2 p1 p2 are estimated, as far as the lens has them.
   NewPoints new_points = NewPoints::inverse_depth;
-  std::optional<double> depth_m = {};      ///< Of new points of which no depth is given. None: the target's distance.
-  double sigma_depth = 0.5;                ///< Of those, relative.
-  std::optional<double> sigma_px = {};     ///< Of a pixel coordinate; in images the least of a match. None: 0.5, 0.11.
-  std::optional<double> sigma_scale = {};  ///< Of the target's size, relative: counted. None: the target's own.
+  std::optional<double> depth_m = {};  ///< Of new points of which no depth is given. None: the target's distance.
+  double sigma_depth = 0.5;            ///< Of those, relative.
+  /// Of a pixel coordinate; in images the least of a match. None: of a table estimated, 0.5 where nothing denies it;
+  /// 0.11 in images.
+  std::optional<double> sigma_px = {};
+  std::optional<double> sigma_scale = {};    ///< Of the target's size, relative: counted. None: the target's own.
   std::optional<double> sigma_times_s = {};  ///< Of the frames' times, all alike. 0: exact. None: by an IMU's clock.
   std::optional<LocalizeStart> start = {};   ///< Else from the target, else the first camera is the world, up to scale.
   LocalizeTarget target = {};

@@ -18,4 +18,18 @@ std::string_view event_name(FrameEvent event) {
   return "";
 }
 
+std::string_view source_name(SigmaPxFrom from) {
+  switch (from) {
+    case SigmaPxFrom::usual:
+      return "default";
+    case SigmaPxFrom::given:
+      return "given";
+    case SigmaPxFrom::rows:
+      return "rows";
+    case SigmaPxFrom::residuals:
+      return "residuals";
+  }
+  return "";
+}
+
 }  // namespace alidade

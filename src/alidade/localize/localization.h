@@ -27,6 +27,15 @@ enum class FrameEvent {
 };
 [[nodiscard]] std::string_view event_name(FrameEvent event);
 
+/// Where σ of a pixel comes from.
+enum class SigmaPxFrom {
+  usual,      ///< Nobody gave it, and the observations do not deny it.
+  given,      ///< By the config.
+  rows,       ///< Each observation states its own.
+  residuals,  ///< Estimated.
+};
+[[nodiscard]] std::string_view source_name(SigmaPxFrom from);
+
 /// A frame of the path.
 struct PathStep {
   long frame = 0;
@@ -172,6 +181,7 @@ struct Localization {
   double still_share = 0.0;   ///< Of the image, edges that never move while the scene does: masked.
   double sigma_px =
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
+  SigmaPxFrom sigma_px_from = SigmaPxFrom::usual;
   std::size_t num_lost = 0;            ///< Frames whose pose observations do not constrain: waiting or predicted.
   std::size_t num_repeated = 0;        ///< Of these, those that showed the last one again while the camera moved.
   std::vector<MissingFrames> missing;  ///< Times that are numbered through them are wrong.

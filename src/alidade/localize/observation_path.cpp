@@ -5,6 +5,19 @@
 // What comes of all frames together.
 
 namespace alidade {
+namespace {
+
+bool each_states_sigma(std::span<const ObservationFrame> frames) {
+  std::size_t num = 0;
+  for (const ObservationFrame& frame : frames) {
+    num += frame.observations.size();
+    for (const FeatureObservation& each : frame.observations)
+      if (!(each.sigma_px > 0.0)) return false;
+  }
+  return num > 0;
+}
+
+}  // namespace
 
 Recording ObservationLocalizer::recording(const KeptFrames& frames) const {
   Recording recording{record_, frames, {}, episodes_.number_of(), period_s(), {}};
@@ -52,6 +65,7 @@ std::optional<ObservationLocalizer::Solution> ObservationLocalizer::solved(Local
 void ObservationLocalizer::sum_up(Localization& result) const {
   const LocalizeTarget& target = config_.target;
   result.sigma_px = config_.filter.sigma_px;
+  if (each_states_sigma(frames_.frames())) result.sigma_px_from = SigmaPxFrom::rows;
   result.num_repeated = num_repeated_;
   result.is_board = target.board.has_value();
   std::optional<Solution> solution;

@@ -196,7 +196,8 @@ nees_per_dof  1      with truth: normalised error squared of the poses, over 6; 
 nees_aligned_per_dof  1      with truth: the same of the aligned positions, over 3; above 1 where σ is too small
 alignment     text   with truth: none, rigid or similarity
 nis_per_dof   1      1 where the innovations are as predicted
-sigma_px      px     of a coordinate
+sigma_px      px     of a coordinate whose row states none; of images the least
+sigma_px_from text   residuals, given, rows (each states its own), or default (the observations do not deny it)
 scale_known   flag   by the target, or a sensor beside the camera
 restarts      count  poses that were found again
 sights        count  observations used

@@ -91,6 +91,7 @@ void fill_path_estimate(const Localization& result, ResultDocument& document) {
   estimate["alignment"] = result.truth.empty() ? JsonValue() : JsonValue(result.scale_known ? "SE(3)" : "Sim(3)");
   estimate["nis_per_dof"] = result.nis_per_dof;
   estimate["sigma_px"] = result.sigma_px;
+  estimate["sigma_px_from"] = source_name(result.sigma_px_from);
   estimate["scale_known"] = result.scale_known;
   estimate["restarts"] = result.num_restarts;
   estimate["loops"] = result.num_loops;
@@ -162,6 +163,9 @@ void path_lines(const Localization& result, std::vector<std::string>& lines) {
                               3.0 * sigma.tail<3>().maxCoeff() / degree));
   if (std::isfinite(result.nis_per_dof))
     lines.push_back(fmt::format("NIS per degree of freedom {:.2f}", result.nis_per_dof));
+  if (result.sigma_px_from == SigmaPxFrom::residuals)
+    lines.push_back(fmt::format("σ of a pixel {:.2g} px (estimated from the {})", result.sigma_px,
+                                result.is_of_images ? "residuals" : "tracks"));
   if (result.smoothed_every > 1)
     lines.push_back(fmt::format("one in {} frames is solved for with all others, those between follow from it",
                                 result.smoothed_every));

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/third_difference.h"
 
 namespace alidade {
 namespace {
@@ -50,22 +51,9 @@ std::vector<Ray> rays_of(std::span<const TargetObservation> observations, const 
 
 using Window = std::span<const Ray, num_of_window>;
 
-/// Weights of the times that leave no polynomial of degree two.
-std::array<double, num_of_window> third_difference(Window rays) {
-  std::array<double, num_of_window> weights{};
-  double squares = 0.0;
-  for (std::size_t i = 0; i < num_of_window; ++i) {
-    weights[i] = 1.0;
-    for (std::size_t j = 0; j < num_of_window; ++j)
-      if (j != i) weights[i] /= rays[i].t_s - rays[j].t_s;
-    squares += weights[i] * weights[i];
-  }
-  for (double& weight : weights) weight /= std::sqrt(squares);
-  return weights;
-}
-
 Difference difference_of(Window rays, double sigma_encoder_rad) {
-  const std::array<double, num_of_window> weights = third_difference(rays);
+  const std::array<double, num_of_window> weights =
+      third_difference({rays[0].t_s, rays[1].t_s, rays[2].t_s, rays[3].t_s});
   Eigen::Vector3d third = Eigen::Vector3d::Zero(), motion = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();
   double middle_s = 0.0, rad_per_px = 0.0;
   for (const Ray& ray : rays) middle_s += ray.t_s / num_of_window;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "alidade/localize/checks/judge.h"
+#include "alidade/localize/config.h"
 
 namespace alidade {
 namespace {
@@ -63,6 +64,14 @@ double supported_z(const GivenNumber& given, const Camera& camera) {
   if (given.name.starts_with("centre")) any = any_centre * camera.width_px;
   if (given.name == "k1") any = any_k1;
   return given.z == 0.0 ? 0.0 : std::abs(given.z) / std::hypot(1.0, given.asked / (given.z * any));
+}
+
+double doubt_of(const GivenNumber& given, const Localization& report) {
+  constexpr double care_z = 3.5, care_z_far = 2.6, far_sigmas = 5.0;
+  const bool is_worse = !report.is_of_images && report.sigma_px_from == SigmaPxFrom::residuals &&
+                        report.sigma_px > LocalizationFilterConfig{}.sigma_px;
+  const bool is_far = is_worse && given.name == "focal length" && moved_sigmas(given, report) > far_sigmas;
+  return supported_z(given, report.camera) / (is_far ? care_z_far : care_z);
 }
 
 std::string lens_changes(const Localization& report) {

@@ -120,13 +120,14 @@ void add_given(const Localization& report, Verdict& verdict) {
   const GivenNumber* worst = nullptr;
   for (const GivenNumber& given : report.given) {
     if (report.is_from_one_place && given.name == "shape of the target") continue;
-    if (worst == nullptr || supported_z(given, report.camera) > supported_z(*worst, report.camera)) worst = &given;
+    if (worst == nullptr || doubt_of(given, report) > doubt_of(*worst, report)) worst = &given;
   }
-  constexpr double care_z = 3.5, bad_z = 15.0, min_move = 0.5;
-  const double z = worst != nullptr ? supported_z(*worst, report.camera) : 0.0;
-  if (z > care_z && moved_sigmas(*worst, report) > min_move)
+  constexpr double bad_z = 15.0, min_move = 0.5;
+  if (worst != nullptr && doubt_of(*worst, report) > 1.0 && moved_sigmas(*worst, report) > min_move) {
+    const double z = supported_z(*worst, report.camera), care_z = z / doubt_of(*worst, report);
     verdict.checks.push_back(
-        {"camera", state_of(z, care_z, bad_z), cause_text(*worst, report), z, care_z, "σ", "path"});
+        {"camera", z > bad_z ? State::bad : State::care, cause_text(*worst, report), z, care_z, "σ", "path"});
+  }
   if (report.given_camera) {
     constexpr double much = 0.2;
     const double gated = gated_share(report);

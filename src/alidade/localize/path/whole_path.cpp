@@ -174,6 +174,7 @@ void solve_with_found_sigma(std::span<const ObservationFrame> frames, const Loca
   if (!by_found) return;
   result = std::move(again);
   result.sigma_px = found_px;
+  result.sigma_px_from = SigmaPxFrom::residuals;
   smoothed = std::move(*by_found);
   given = std::move(problem);
 }

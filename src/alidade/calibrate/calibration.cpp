@@ -223,6 +223,8 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
   heed_changes(change, scores, taken, result);
+  if (const auto rival = rival_model(board, result.board_views, result.config, result))
+    heed_rival_model(*rival, result.verdict);
   heed_assumptions(result.assumed, result.verdict);
   return result;
 }

@@ -7,6 +7,9 @@
 #include <sstream>
 #include <vector>
 
+#include "alidade/calibrate/solve/weights.h"
+#include "alidade/camera/camera_diff.h"
+
 namespace alidade {
 namespace {
 
@@ -52,7 +55,70 @@ std::string options_for(const std::string& name, const CalibrateConfig& config) 
   return "use" + options + (fixed.empty() && had_fix && config.model == "brown" ? ", and no --fix" : "");
 }
 
+/// Sum of squares of the views' residuals, by the corners' own σ where they have one; NaN where a view was rejected.
+double squares_of(std::span<const BoardView> views, const CalibrateReport& report) {
+  const bool has_cov = have_covariances(views);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    if (!report.views[k].used) return std::nan("");
+    for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
+      const double weight = has_cov ? 2.0 / views[k].corners[i].cov.trace() : 1.0;
+      sum += weight * report.views[k].corners[i].residual_px.squaredNorm();
+    }
+  }
+  return sum;
+}
+
+/// exp(−Δχ²/2), the corners of a photo sharing errors as they do.
+double weight_of(double squares, double squares_of_rival, const CalibrateReport& report) {
+  const double dof = std::max(1.0, 2.0 * report.corners_used - report.num_parameters);
+  const double excess = std::max(0.0, dof * (squares_of_rival / squares - 1.0));
+  return std::exp(-0.5 * excess / std::max(1.0, report.clusters.design_effect));
+}
+
 }  // namespace
+
+std::optional<RivalModel> rival_model(const Board& board, std::span<const BoardView> views,
+                                      const CalibrateConfig& config, const CalibrateReport& report) {
+  constexpr double ruled_out = 0.01, agree_sigmas = 3.0;
+  const bool is_brown = config.model == "brown";
+  if (!is_brown && config.model != "kannala_brandt") return std::nullopt;
+  CalibrateConfig other = with_model(config, is_brown ? "kannala_brandt" : "brown");
+  other.board_shape = BoardShape::given;
+  const std::vector<BoardView> used = used_views(views, report, 60);
+  const ImageSize size{report.camera.width_px, report.camera.height_px};
+  CalibrateConfig same = config;  // from these corners alone, too
+  same.board_shape = BoardShape::given;
+  CalibrateReport rival = calibrate(board, used, size, other, report.board_points);
+  const CalibrateReport own = calibrate(board, used, size, same, report.board_points);
+  const auto converged = CalibrateReport::Status::converged;
+  if (rival.status != converged || own.status != converged) return std::nullopt;
+  const double weight = weight_of(squares_of(used, own), squares_of(used, rival), report);
+  if (!(weight > ruled_out)) return std::nullopt;
+  rival.camera.cov.resize(0, 0);  // in σ of what is stated
+  const auto diff = diff_cameras(report.camera, rival.camera, {.cols = 30, .rows = 20});
+  if (!diff) return std::nullopt;
+  RivalModel found{.model = other.model, .weight = weight};
+  for (int row = 0; row < diff->in_sigmas.rows; ++row) {
+    for (int col = 0; col < diff->in_sigmas.cols; ++col) {
+      const auto at = static_cast<std::size_t>(row * diff->in_sigmas.cols + col);
+      if (!(diff->in_sigmas.values[at] > found.sigmas)) continue;
+      found.sigmas = diff->in_sigmas.values[at];
+      found.apart_px = std::hypot(diff->delta_u.values[at], diff->delta_v.values[at]);
+      found.px = diff->in_sigmas.px(col, row);
+    }
+  }
+  return found.sigmas > agree_sigmas ? std::optional(found) : std::nullopt;
+}
+
+void heed_rival_model(const RivalModel& rival, Verdict& verdict) {
+  Check check{.name = "one model", .state = State::care, .value = rival.sigmas, .limit = 3.0, .unit = "σ"};
+  check.figure = "sigma";
+  check.text = rival.model + " fits these photos as well, and differs by " + text_of(rival.apart_px, 2) + " px (" +
+               text_of(rival.sigmas, 2) + "σ) at (" + text_of(rival.px.x(), 4) + ", " + text_of(rival.px.y(), 4) +
+               "): no board says which is right there";
+  heed(check, "cover the image with boards to its edges, or use no more of it than they cover", verdict);
+}
 
 std::optional<FittingModel> fitting_model(const Board& board, std::span<const BoardView> views, ImageSize size,
                                           const CalibrateConfig& config, const CalibrateReport& failed) {

@@ -7,6 +7,7 @@
 #include "alidade/board/board.h"
 #include "alidade/calibrate/calibrate.h"
 #include "alidade/calibrate/study.h"
+#include "alidade/estimation/verdict.h"
 
 namespace alidade {
 
@@ -30,5 +31,21 @@ void advise_fitting_model(const Board& board, std::span<const BoardView> views, 
 /// What to type for the model whose held-out error is proved the lowest, "use --model kannala_brandt"; empty where none
 /// is proved better than the one in use.
 [[nodiscard]] std::string better_model_advice(const CalibrationStudy& study, const CalibrateConfig& config);
+
+/// The other distorted model where it fits these corners as well: what it shows elsewhere, no photo contradicts.
+struct RivalModel {
+  std::string model;
+  double weight = 0.0;  ///< Of its fit against that of the model in use, by χ² where photos share errors.
+  double apart_px = 0.0, sigmas = 0.0;           ///< Where it differs most, in what is stated there.
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< There.
+};
+
+/// kannala_brandt for brown, and brown for kannala_brandt. None where it is ruled out (a weight of 1 %), or where the
+/// two agree within 3σ over the image.
+[[nodiscard]] std::optional<RivalModel> rival_model(const Board& board, std::span<const BoardView> views,
+                                                    const CalibrateConfig& config, const CalibrateReport& report);
+
+/// Names it in the verdict, which is of care at best.
+void heed_rival_model(const RivalModel& rival, Verdict& verdict);
 
 }  // namespace alidade

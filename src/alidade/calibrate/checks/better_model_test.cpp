@@ -98,6 +98,47 @@ TEST(BetterModel, WhatToTypeIsSaidAndNeverWhatIsTypedAlready) {
   EXPECT_EQ(better_model_advice({}, {}), "");
 }
 
+/// Of those that lie within so much of the image's width and height, about its centre.
+std::vector<BoardView> in_the_centre(const std::vector<BoardView>& views, double share, std::size_t num) {
+  const Eigen::Array2d half = 0.5 * Eigen::Array2d(wide_size.width_px, wide_size.height_px);
+  std::vector<BoardView> inside;
+  for (const BoardView& view : views) {
+    const bool is_inside = std::ranges::all_of(
+        view.corners, [&](const Corner& corner) { return ((corner.px.array() - half).abs() < share * half).all(); });
+    if (is_inside && inside.size() < num) inside.push_back(view);
+  }
+  return inside;
+}
+
+// Such were ● with the image's corner 7.5σ off: what Brown's polynomial does there no board had said.
+TEST(BetterModel, ARivalIsNamedWhereNoBoardRulesItOut) {
+  int named = 0;
+  for (const std::uint64_t seed : {3u, 4u, 5u, 6u}) {
+    const std::vector<BoardView> views = in_the_centre(wide_views(100.0, 300, seed), 0.7, 24);
+    ASSERT_EQ(views.size(), 24u);
+    const Calibration result = judged(views, {});
+    const auto rival = rival_model(wide_board, result.board_views, result.config, result);
+    if (!rival) continue;
+    ++named;
+    EXPECT_EQ(rival->model, "kannala_brandt");
+    EXPECT_GT(rival->sigmas, 3.0);
+    EXPECT_NE(result.verdict.state, State::good);
+    const auto check = std::ranges::find(result.verdict.checks, "one model", &Check::name);
+    ASSERT_NE(check, result.verdict.checks.end());
+    EXPECT_THAT(check->text, HasSubstr("kannala_brandt fits these photos as well, and differs by"));
+  }
+  EXPECT_GE(named, 3) << "of 4";
+}
+
+TEST(BetterModel, WhereBoardsAreAllOverTheImageNoneIs) {
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
+    for (const char* model : {"brown", "kannala_brandt"}) {
+      const Calibration result = judged(wide_views(110.0, 24, seed), {.model = model});
+      EXPECT_FALSE(rival_model(wide_board, result.board_views, result.config, result)) << seed << " " << model;
+    }
+  }
+}
+
 TEST(BetterModel, TheRichestInUseIsNotProposedAgain) {
   const Calibration calibration = judged(wide_views(150.0, 12, 4), {.model = "kannala_brandt"});
   ASSERT_EQ(calibration.status, CalibrateReport::Status::converged);

@@ -183,6 +183,7 @@ ModelErrors settle_model(Calibration& result) {
     free.board_shape = BoardShape::free;
     if (solve_again(free, result)) {
       result.config = std::move(free);
+      errors.unseen.clear();  // that is another solve
       return errors;
     }
   }
@@ -212,6 +213,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.counts = count_photos(result);
   const std::vector<ViewScore> scores = view_scores(board, result.config, result.board_views, result);
   result.assumed = count_assumptions(board, result.config, result.board_views, scores, air, result);
+  if (auto row = not_tested(errors.unseen, result)) result.assumed.push_back(std::move(*row));
   const OrderTaken taken = order_taken(result);
   const LensChangeStudy change = find_change(scores, taken, result);
   if (change.change) count_change(*change.change, result);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "alidade/calibrate/study.h"
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -77,7 +78,51 @@ void count_air(const Camera& air, const Eigen::MatrixXd& K, const LensSplit& spl
   cov(split.fixed, split.fixed) = C;
 }
 
+double median_depth_m(const CalibrateReport& report) {
+  std::vector<double> depths;
+  for (const ViewFit& view : report.views)
+    if (view.used) depths.push_back(view.cam_from_board.translation.z());
+  return median_of(std::move(depths));
+}
+
+std::string words_of(const UnseenMode& unseen, const CalibrateReport& report) {
+  constexpr double thin_rad = 0.1, n = 1.5;  // a window
+  const auto sized = [&](double unit) { return text_of(unit * unseen.size, 2); };
+  const double focal_px = params(report.camera.lens)[0];
+  switch (unseen.kind) {
+    case ErrorMode::Kind::focus:
+      return "a focal length that follows the distance, by " + sized(100.0 / median_depth_m(report)) +
+             " % from far away to these boards";
+    case ErrorMode::Kind::pupil:
+      return "an entrance pupil that moves by " + sized(1e3) + " mm · θ²";
+    case ErrorMode::Kind::plate_x:
+    case ErrorMode::Kind::plate_y:
+      return "a window of " + sized(1e3 * n / (thin_rad * (1.0 - 1.0 / (n * n)))) + " mm, tilted by 0.1 rad about " +
+             (unseen.kind == ErrorMode::Kind::plate_x ? "y" : "x");
+    case ErrorMode::Kind::tilt:
+      return "corners off along the tilt, by " + sized(0.1 * std::sqrt(0.5) * focal_px) +
+             " px where a board tilted by 45° is 10 % nearer than at its middle";
+    default:
+      return "boards that all move by " + sized(1e3) + " mm along " +
+             (unseen.kind == ErrorMode::Kind::motion_z   ? "the axis"
+              : unseen.kind == ErrorMode::Kind::motion_x ? "the rows"
+                                                         : "the columns") +
+             " while rows are read";
+  }
+}
+
 }  // namespace
+
+std::optional<Assumption> not_tested(std::span<const UnseenMode> unseen, const CalibrateReport& report) {
+  if (unseen.empty()) return std::nullopt;
+  const auto names = param_names(report.camera.lens);
+  Assumption row{.name = "lens.not_tested", .value = std::nan(""), .sigma = 0.0, .moves = std::nan("")};
+  row.moved = "these photos would not show, though it moves the lens by 5σ: ";
+  for (std::size_t i = 0; i < unseen.size(); ++i)
+    row.moved += (i == 0 ? "" : "; ") + words_of(unseen[i], report) + " (" +
+                 names[static_cast<std::size_t>(unseen[i].moved)] + ")";
+  return row;
+}
 
 std::vector<Assumption> count_assumptions(const Board& board, const CalibrateConfig& config,
                                           std::span<const BoardView> views, std::span<const ViewScore> scores,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "alidade/calibrate/calibrate.h"
+#include "alidade/calibrate/checks/error_modes.h"
 #include "alidade/calibrate/checks/view_scores.h"
 #include "alidade/estimation/verdict.h"
 
@@ -20,5 +21,9 @@ namespace alidade {
                                                         std::span<const BoardView> views,
                                                         std::span<const ViewScore> scores,
                                                         const std::optional<Camera>& air, CalibrateReport& report);
+
+/// One row, "lens.not_tested", for what would move the lens by 5σ without showing in these photos; none where there is
+/// nothing. It has no say in the verdict.
+[[nodiscard]] std::optional<Assumption> not_tested(std::span<const UnseenMode> unseen, const CalibrateReport& report);
 
 }  // namespace alidade

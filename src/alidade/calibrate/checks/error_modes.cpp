@@ -53,18 +53,28 @@ Eigen::Vector2d displacement_of(ErrorMode::Kind kind, const Lens& lens, const Ei
   return at * std::pow(at.norm(), power);
 }
 
-Eigen::Vector3d displacement_in_cam(ErrorMode::Kind kind, const Eigen::Vector3d& point_in_cam, double row) {
+Eigen::Vector3d displacement_in_cam(ErrorMode::Kind kind, const SeenPoint& point) {
   const Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
-  if (kind >= ErrorMode::Kind::motion_x)
-    return row * Eigen::Vector3d::Unit(static_cast<Index>(kind) - static_cast<Index>(ErrorMode::Kind::motion_x));
-  if (kind != ErrorMode::Kind::pupil) return point_in_cam.normalized()[kind == ErrorMode::Kind::plate_x ? 0 : 1] * axis;
-  const double angle = std::atan2(point_in_cam.head<2>().norm(), point_in_cam.z());
-  return -angle * angle * axis;
+  const double z = point.in_cam.z(), angle = std::atan2(point.in_cam.head<2>().norm(), z);
+  switch (kind) {
+    case ErrorMode::Kind::focus:
+      return Eigen::Vector3d(point.in_cam.x(), point.in_cam.y(), 0.0) / point.middle_m;
+    case ErrorMode::Kind::tilt:
+      return (point.middle_m - z) * Eigen::Vector3d(point.normal.x(), point.normal.y(), 0.0);
+    case ErrorMode::Kind::pupil:
+      return -angle * angle * axis;
+    case ErrorMode::Kind::plate_x:
+    case ErrorMode::Kind::plate_y:
+      return point.in_cam.normalized()[kind == ErrorMode::Kind::plate_x ? 0 : 1] * axis;
+    default:
+      return point.row *
+             Eigen::Vector3d::Unit(static_cast<Index>(kind) - static_cast<Index>(ErrorMode::Kind::motion_x));
+  }
 }
 
 std::vector<ErrorMode> error_modes(std::span<const Eigen::Vector3d> board_points) {
   std::vector<ErrorMode> modes = print_modes(board_points);
-  for (auto kind = static_cast<Index>(ErrorMode::Kind::radial); kind <= static_cast<Index>(ErrorMode::Kind::motion_z);
+  for (auto kind = static_cast<Index>(ErrorMode::Kind::radial); kind <= static_cast<Index>(ErrorMode::Kind::focus);
        ++kind)
     modes.push_back({.kind = static_cast<ErrorMode::Kind>(kind)});
   return modes;
@@ -72,12 +82,14 @@ std::vector<ErrorMode> error_modes(std::span<const Eigen::Vector3d> board_points
 
 double ordinary_size(const ErrorMode& mode, const Camera& camera) {
   constexpr double lengths = 2e-3, spacing_m = 1e-4, corner_share = 1.6e-3, pupil_m = 2e-3, plate_m = 5e-4,
-                   motion_m = 5e-4;
+                   motion_m = 5e-4, tilt_px = 0.1, focus_m = 4e-3;
   if (!mode.is_of_lens()) return mode.kind == ErrorMode::Kind::spacing ? spacing_m / mode.largest_m : lengths;
   if (mode.is_of_motion()) return motion_m;
-  if (mode.is_of_rays()) return mode.kind == ErrorMode::Kind::pupil ? pupil_m : plate_m;
+  if (mode.kind == ErrorMode::Kind::focus) return focus_m;
   const Eigen::VectorXd of_lens = params(camera.lens);
   const double focal_px = std::sqrt(of_lens[0] * of_lens[1]);
+  if (mode.kind == ErrorMode::Kind::tilt) return tilt_px / (0.1 * std::sqrt(0.5) * focal_px);  // 45°, 10 % nearer
+  if (mode.is_of_rays()) return mode.kind == ErrorMode::Kind::pupil ? pupil_m : plate_m;
   const Eigen::Vector2d corner_px(0.5 * camera.width_px, 0.5 * camera.height_px);
   const Eigen::Vector3d corner = (corner_px / focal_px).homogeneous();
   // Of the image's diagonal: 2 px of 1000x750.
@@ -120,6 +132,9 @@ std::string sentence_of(const ErrorMode& mode, double size, double sigma) {
               : mode.kind == ErrorMode::Kind::motion_x ? "along the rows"
                                                        : "along the columns") +
              " while its rows are read (rolling shutter)";
+    case ErrorMode::Kind::tilt:
+    case ErrorMode::Kind::focus:
+      break;
   }
   return "";
 }

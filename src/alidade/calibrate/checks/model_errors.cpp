@@ -37,18 +37,27 @@ struct ModeView {
   const Camera& camera;
 };
 
+Eigen::Vector3d middle_of(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points) sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
 /// Derivative of the view's pixels by the size of a mode, where that by a point of the board is the pose's translation.
 VectorXd column_of(const ErrorMode& mode, const ModeView& view, const Eigen::Ref<const MatrixXd>& by_point) {
   const Index half = by_point.rows() / 2;
   const VectorXd focal = params(view.camera.lens).head<2>();
   VectorXd column = VectorXd::Zero(by_point.rows());
+  SeenPoint seen{.normal = view.cam_from_board.rotation * Eigen::Vector3d::UnitZ(),
+                 .middle_m = (view.cam_from_board * middle_of(view.board_points)).z()};
   for (std::size_t i = 0; i < view.corners.size(); ++i) {
     const auto u = static_cast<Index>(i), v = half + u;
     const auto point = view.corners.index[i];
     const Eigen::Vector3d in_cam = view.cam_from_board * view.board_points[static_cast<std::size_t>(point)];
     if (mode.is_of_rays()) {
-      const double row = view.corners.v_px[i] / view.camera.height_px - 0.5;
-      const Eigen::Vector3d by = view.cam_from_board.rotation.conjugate() * displacement_in_cam(mode.kind, in_cam, row);
+      seen.in_cam = in_cam;
+      seen.row = view.corners.v_px[i] / view.camera.height_px - 0.5;
+      const Eigen::Vector3d by = view.cam_from_board.rotation.conjugate() * displacement_in_cam(mode.kind, seen);
       column[u] = by_point.row(u).head<3>().dot(by);
       column[v] = by_point.row(v).head<3>().dot(by);
     } else if (mode.is_of_lens()) {
@@ -224,6 +233,7 @@ class ModeFindings {
 
   /// A mode by itself; whether it is included.
   bool take(Index m) {
+    if (modes_[static_cast<std::size_t>(m)].is_untested()) return false;
     const ModeEstimate& one = estimates_[static_cast<std::size_t>(m)];
     const double times = times_chance(one, included_sigmas, num_views_);
     if (!is_determined(m) || times <= 1.0) return false;
@@ -243,6 +253,22 @@ class ModeFindings {
     std::ranges::sort(group, std::ranges::greater{}, [&](Index m) { return sigmas_alone(m); });
     for (const Index m : group)
       include(m, m == group.front() ? sigmas : 0.0, sigmas / included_sigmas, sigmas > proved_sigmas);
+  }
+
+  /// Those of ordinary sizes that are not proved where they move a parameter by 5 of `sigmas`. Of `free`.
+  [[nodiscard]] std::vector<UnseenMode> unseen(const VectorXd& sigmas, const std::vector<Index>& free) const {
+    constexpr double too_far = 5.0, usual = 2.0;
+    std::vector<UnseenMode> unseen;
+    for (Index m = 0; m < std::ssize(modes_); ++m) {
+      const ErrorMode& mode = modes_[static_cast<std::size_t>(m)];
+      if (!mode.is_of_rays() || std::ranges::find(found_, m, &FoundMode::mode) != found_.end()) continue;
+      Index moved = 0;
+      const double size = too_far / all_.follows.col(m).cwiseAbs().cwiseQuotient(sigmas).maxCoeff(&moved);
+      const bool would_show = mode.kind != ErrorMode::Kind::tilt && size > proved_sigmas * sigma(m);
+      if (would_show || !(size < usual * ordinary_size(mode, camera_))) continue;
+      unseen.push_back({mode.kind, size, free[static_cast<std::size_t>(moved)]});
+    }
+    return unseen;
   }
 
   [[nodiscard]] double sigma(Index m) const { return estimates_[static_cast<std::size_t>(m)].sigma(); }
@@ -338,6 +364,7 @@ ModelErrors model_errors(std::span<const BoardView> views, const CalibrateReport
   if (!findings.found().empty())
     errors.moves = sigmas_of(count_modes(*all, findings.found(), findings.variance(), cov), stated);
   errors.cov(free, free) = cov;
+  errors.unseen = findings.unseen((stated + cov).diagonal().cwiseSqrt(), free);
   return errors;
 }
 

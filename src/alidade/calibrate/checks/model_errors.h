@@ -3,8 +3,10 @@
 #include <Eigen/Core>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "alidade/calibrate/calibrate.h"
+#include "alidade/calibrate/checks/error_modes.h"
 
 namespace alidade {
 
@@ -22,6 +24,7 @@ struct ModelErrors {
   /// chance shows of one of so many; and the ratio of the print's lengths where the photos separate it from fx / fy by
   /// less than the stated σ.
   Eigen::MatrixXd cov;
+  std::vector<UnseenMode> unseen;  ///< Of an ordinary size: below 4σ where they move the lens by 5σ.
 };
 
 /// Score tests of them: what the residuals would gain from one more parameter, lens and poses following. σ is that of

@@ -7,6 +7,7 @@
 #include "alidade/results/calibration_outcome.h"
 #include "alidade/tables/corner_file.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/ending.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/images.h"
 #include "python/bindings/waiting.h"
@@ -148,7 +149,7 @@ OutcomePtr from_corner_file(const std::string& file, bool skip_bad, std::pair<in
 py::tuple found_board(const cv::Mat& pixels, const Board& board) {
   BoardDetection found;
   {
-    const py::gil_scoped_release released;
+    const Released released;
     found = find_board(pixels, board);
   }
   const py::ssize_t num = num_points(board);
@@ -165,7 +166,7 @@ py::tuple found_board(const cv::Mat& pixels, const Board& board) {
 py::tuple find_in_file(const std::string& file, const Board& board) {
   cv::Mat pixels;
   {
-    const py::gil_scoped_release released;
+    const Released released;
     pixels = decode_photo(read_file(file), file);
   }
   return found_board(pixels, board);

@@ -10,6 +10,7 @@
 #include "alidade/formats/camera_file.h"
 #include "alidade/formats/camera_formats.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/ending.h"
 #include "python/bindings/images.h"
 
 namespace alidade::python {
@@ -37,7 +38,7 @@ Array project_points(const Camera& camera, const Array& points) {
   const auto points_in_cam = vectors_of<3>(points);
   Array pixels = empty_array({points.shape(0), 2});
   double* const to = pixels.mutable_data();
-  const py::gil_scoped_release released;
+  const Released released;
   in_parts(points_in_cam.size(), [&](std::size_t begin, std::size_t end) {
     const auto found = project(camera, points_in_cam.subspan(begin, end - begin));
     for (std::size_t i = begin; i < end; ++i) put<2>(found[i - begin] ? &*found[i - begin] : nullptr, to + 2 * i);
@@ -60,7 +61,7 @@ py::tuple project_points_with_jacobians(const Camera& camera, const Array& point
   double *const px = pixels.mutable_data(), *const J_point = by_point.mutable_data(),
                 *const J_lens = by_lens.mutable_data();
   {
-    const py::gil_scoped_release released;
+    const Released released;
     in_parts(points_in_cam.size(), [&](std::size_t begin, std::size_t end) {
       const auto found = project_with_jacobians(camera, points_in_cam.subspan(begin, end - begin));
       for (std::size_t i = begin; i < end; ++i) {
@@ -81,7 +82,7 @@ py::tuple rays_of(const Camera& camera, const Array& px) {
   Array origins = empty_array({px.shape(0), 3}), directions = empty_array({px.shape(0), 3});
   double *const origin = origins.mutable_data(), *const direction = directions.mutable_data();
   {
-    const py::gil_scoped_release released;
+    const Released released;
     in_parts(pixels.size(), [&](std::size_t begin, std::size_t end) {
       const auto rays = observation_rays(camera, pixels.subspan(begin, end - begin));
       for (std::size_t i = begin; i < end; ++i) {
@@ -98,7 +99,7 @@ Array sigma_of_pixels(const Camera& camera, const Array& px, double distance_m) 
   const auto pixels = vectors_of<2>(px);
   Array sigmas = empty_array({px.shape(0)});
   double* const to = sigmas.mutable_data();
-  const py::gil_scoped_release released;
+  const Released released;
   const std::vector<double> found = detail::sigma_at(camera, pixels, distance_m);
   std::copy(found.begin(), found.end(), to);
   return sigmas;
@@ -125,7 +126,7 @@ py::array undistorted_image(const Camera& camera, const py::array& image) {
   const cv::Mat pixels = photos.load(0);
   py::array straight(image.dtype(), std::vector<py::ssize_t>(image.shape(), image.shape() + image.ndim()));
   cv::Mat to(pixels.rows, pixels.cols, pixels.type(), straight.mutable_data());
-  const py::gil_scoped_release released;
+  const Released released;
   PixelMap map = undistortion_map(camera, undistorted_camera(camera));
   cv::remap(pixels, to, cv::Mat(pixels.rows, pixels.cols, CV_32F, map.u_px.data()),
             cv::Mat(pixels.rows, pixels.cols, CV_32F, map.v_px.data()), cv::INTER_LINEAR);
@@ -165,7 +166,7 @@ py::dict grid_dict(const PixelGrid& grid) {
 py::object diff_of(const Camera& a, const Camera& b, double distance_m) {
   std::optional<CameraDiff> diff;
   {
-    const py::gil_scoped_release released;
+    const Released released;
     diff = diff_cameras(a, b, {.distance_m = distance_m});
   }
   if (!diff) return py::none();

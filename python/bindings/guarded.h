@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "python/bindings/bindings.h"
+#include "python/bindings/ending.h"
 
 namespace alidade::python {
 
@@ -18,7 +19,7 @@ class Guarded {
   /// From Python: other threads run meanwhile. `work` touches no Python object.
   template <class Work>
   auto from_python(const Work& work) {
-    const py::gil_scoped_release released;
+    const Released released;
     return from_work(work);
   }
   /// From a thread without the GIL.

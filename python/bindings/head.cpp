@@ -1,6 +1,7 @@
 #include "alidade/files/files.h"
 #include "alidade/heads/head_device.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/ending.h"
 
 /// A head that is connected: asked, and moved where its owner allowed it. Calls end within the head's timeout, without
 /// the GIL.
@@ -37,7 +38,7 @@ class ConnectedHead {
   [[nodiscard]] py::dict position() {
     HeadPosition reading;
     {
-      const py::gil_scoped_release free;
+      const Released released;
       reading = held_ ? held_->position() : device_->position();
     }
     py::dict made;
@@ -48,11 +49,11 @@ class ConnectedHead {
   }
   double command(const AxisPair& pan_tilt_rad) {
     if (!held_) throw InputError(device_->name() + ": may not move; open it with move=True");
-    const py::gil_scoped_release free;
+    const Released released;
     return held_->command(vector_of(pan_tilt_rad)).t_s;
   }
   void stop() {
-    const py::gil_scoped_release free;
+    const Released released;
     if (held_) held_->stop();
   }
 

@@ -1,6 +1,7 @@
 #include "python/bindings/images.h"
 
 #include "alidade/imaging/image_codecs.h"
+#include "python/bindings/ending.h"
 #include "python/bindings/waiting.h"
 
 namespace alidade::python {
@@ -32,7 +33,7 @@ void bind_images(py::module_& module) {
     const cv::Mat pixels = photos.load(0);
     std::string bytes;
     {
-      const py::gil_scoped_release released;
+      const Released released;
       bytes = png_bytes(pixels);
     }
     return py::bytes(bytes);

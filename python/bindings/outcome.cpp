@@ -3,6 +3,7 @@
 #include "alidade/results/result_folder.h"
 #include "alidade/results/save.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/ending.h"
 
 namespace alidade::python {
 namespace {
@@ -99,7 +100,7 @@ py::dict grid_of(const DataGrid& grid) {
 
 void save_outcome(const Outcome& outcome, const std::string& folder) {
   JobOutcome copy = outcome.job;
-  const py::gil_scoped_release released;
+  const Released released;
   save(std::move(copy), folder);
 }
 
@@ -107,7 +108,7 @@ void save_outcome(const Outcome& outcome, const std::string& folder) {
 void save_files(const std::vector<std::pair<std::string, py::bytes>>& files, int exit_code, const std::string& folder) {
   std::vector<std::pair<std::string, std::string>> held;
   for (const auto& [name, bytes] : files) held.emplace_back(name, std::string(bytes));
-  const py::gil_scoped_release released;
+  const Released released;
   ResultDocument document;
   document.verdict.exit_code = static_cast<ExitCode>(exit_code);
   ResultFolder results(folder, document);

@@ -7,6 +7,8 @@
 #include <mutex>
 #include <thread>
 
+#include "python/bindings/ending.h"
+
 namespace alidade::python {
 namespace {
 
@@ -38,39 +40,76 @@ struct Shared {
   }
 };
 
-/// Work that nobody waits for any more: it ends soon, and before Python does.
-std::mutex left_mutex;
-std::list<std::pair<std::shared_ptr<Shared>, std::thread>> left_behind;
+/// All work, and the threads of that for which nobody waits any more: it ends soon, and before Python does.
+struct Begun {
+  std::mutex mutex;
+  std::list<std::weak_ptr<Shared>> all;
+  std::list<std::pair<std::shared_ptr<Shared>, std::thread>> left_behind;
+};
+
+/// Never destroyed: threads may outlive the end of Python.
+Begun& begun() {
+  static auto* const it = new Begun;
+  return *it;
+}
 
 bool has_ended(const std::shared_ptr<Shared>& shared) {
   const std::scoped_lock lock(shared->mutex);
   return shared->is_done;
 }
 
+std::shared_ptr<Shared> begun_work() {
+  auto shared = std::make_shared<Shared>();
+  const std::scoped_lock lock(begun().mutex);
+  begun().all.remove_if([](const std::weak_ptr<Shared>& each) { return each.expired(); });
+  begun().all.push_back(shared);
+  return shared;
+}
+
 void leave_behind(const std::shared_ptr<Shared>& shared, std::thread thread) {
   shared->stops = true;
-  const std::scoped_lock lock(left_mutex);
-  for (auto each = left_behind.begin(); each != left_behind.end();) {
+  const std::scoped_lock lock(begun().mutex);
+  auto& left = begun().left_behind;
+  for (auto each = left.begin(); each != left.end();) {
     if (!has_ended(each->first)) {
       ++each;
       continue;
     }
     each->second.join();
-    each = left_behind.erase(each);
+    each = left.erase(each);
   }
-  left_behind.emplace_back(shared, std::move(thread));
+  left.emplace_back(shared, std::move(thread));
+}
+
+std::vector<std::shared_ptr<Shared>> all_work() {
+  const std::scoped_lock lock(begun().mutex);
+  std::vector<std::shared_ptr<Shared>> work;
+  for (const std::weak_ptr<Shared>& each : begun().all) {
+    if (auto shared = each.lock()) work.push_back(std::move(shared));
+  }
+  return work;
+}
+
+void stop_all() {
+  for (const auto& shared : all_work()) shared->stops = true;
 }
 
 void join_all() {
-  const py::gil_scoped_release released;
-  const std::scoped_lock lock(left_mutex);
-  for (auto& [shared, thread] : left_behind) thread.join();
-  left_behind.clear();
+  for (const auto& shared : all_work()) {
+    std::unique_lock lock(shared->mutex);
+    shared->ended.wait(lock, [&] { return shared->is_done; });
+  }
+  std::list<std::pair<std::shared_ptr<Shared>, std::thread>> left;
+  {
+    const std::scoped_lock lock(begun().mutex);
+    left.swap(begun().left_behind);
+  }
+  for (auto& [shared, thread] : left) thread.join();
 }
 
 /// Whether it is over; waits a moment. The GIL is free meanwhile.
 bool wait_a_moment(Shared& shared) {
-  const py::gil_scoped_release released;
+  const Released released;
   std::unique_lock lock(shared.mutex);
   return shared.ended.wait_for(lock, std::chrono::milliseconds(50), [&] { return shared.is_done; });
 }
@@ -87,14 +126,15 @@ void tell(Shared& shared, const py::object& progress) {
     done = shared.done;
     total = shared.total;
   }
-  const py::object answer = progress(what, done, total);
-  if (answer.is(py::bool_(false))) throw Interrupted();
+  py::detail::make_caster<bool> goes_on;  // of bool and numpy's bool alone
+  if (goes_on.load(called(progress, py::make_tuple(what, done, total)), false) && !goes_on) throw Interrupted();
 }
 
 }  // namespace
 
 void wait_for(std::function<void(const Progress&)> work, const py::object& progress) {
-  const auto shared = std::make_shared<Shared>();
+  { const Released stays_after_the_end; }
+  const std::shared_ptr<Shared> shared = begun_work();  // with the GIL: Python does not end in between
   std::thread thread([shared, work = std::move(work)]() mutable {
     std::exception_ptr thrown;
     try {
@@ -130,7 +170,7 @@ std::shared_ptr<void> kept(py::object object) {
 }
 
 void bind_waiting(py::module_& module) {
-  py::module_::import("atexit").attr("register")(py::cpp_function(&join_all));
+  at_end(&stop_all, &join_all);
   static_cast<void>(module);
 }
 

@@ -10,8 +10,9 @@
 namespace alidade::python {
 
 /// Runs `work` on a thread of its own, without the GIL, while this one waits: Ctrl-C is answered within 0.1 s, and
-/// `progress`, a Python callable of (what, done, total) or None, is called from here alone. Where it returns False, or
-/// raises, or Ctrl-C is pressed, the work is asked to stop and left behind: it owns all that it uses.
+/// `progress`, a Python callable of (what, done, total) or None, is called from here alone. Where it returns False
+/// (Python's or numpy's), or raises, or Ctrl-C is pressed, the work is asked to stop and left behind: it owns all that
+/// it uses. Where Python ends, all work is stopped before.
 void wait_for(std::function<void(const Progress&)> work, const py::object& progress);
 
 /// The same for work that has a value.

@@ -285,8 +285,10 @@ class Photos(InFolder):
         al.calibrate(self.files, board=BOARD, progress=lambda *news: reported.append(news))
         self.assertTrue(reported)
         self.assertTrue(all(isinstance(what, str) and done >= 0 and total >= 0 for what, done, total in reported))
-        with self.assertRaises(al.Interrupted):
-            al.calibrate(self.files, board=BOARD, progress=lambda *news: False)
+        for no in (False, np.False_):
+            with self.assertRaises(al.Interrupted):
+                al.calibrate(self.files, board=BOARD, progress=lambda *news: no)
+        self.assertTrue(al.calibrate(self.files, board=BOARD, progress=lambda *news: np.True_))
         with self.assertRaises(ZeroDivisionError):
             al.calibrate(self.files, board=BOARD, progress=lambda *news: 1 / 0)
 

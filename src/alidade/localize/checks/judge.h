@@ -41,8 +41,8 @@ void add_sensors(const Localization& report, Verdict& verdict);
 /// stand still also by where it was half of the time before or after its mean, as the world is then anywhere between.
 [[nodiscard]] double moved_sigmas(const GivenNumber& given, const Localization& result);
 
-/// Its score over that from which on it is doubted: above 1. Of pixels that are found to be worse than usual another
-/// focal length shows less, and moves the path by more of its σ than it shows.
+/// Its score over that from which on it is doubted: above 1. Water of another index, and where pixels are found to be
+/// worse than usual another focal length, move the path by more of its σ than they show: there from a lower score on.
 [[nodiscard]] double doubt_of(const GivenNumber& given, const Localization& report);
 
 /// What the observations ask of something given, with its size; where the path is solved with an IMU, together with its

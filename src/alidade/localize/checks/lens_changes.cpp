@@ -51,6 +51,9 @@ std::string cause_text(const GivenNumber& given, const Localization& report) {
   if (given.name == "rotation of the target") return "the target rotates against the other points, by " + size + z;
   if (given.name == "readout")
     return "rows are not of one moment: a rolling shutter of " + size + " from the first to the last" + z;
+  if (given.name == "water's index")
+    return "the observations indicate water of another index, by " + size + z +
+           ": the camera file is not of this lens and port in this water";
   const bool has_imu = report.imu && report.imu->fault == ImuFault::none;
   return "the observations indicate another " + std::string(given.name) + ", by " + size + z +
          ": the camera file is not of this lens as it was used" +
@@ -67,10 +70,11 @@ double supported_z(const GivenNumber& given, const Camera& camera) {
 }
 
 double doubt_of(const GivenNumber& given, const Localization& report) {
-  constexpr double care_z = 3.5, care_z_far = 2.6, far_sigmas = 5.0;
+  constexpr double care_z = 3.5, care_z_far = 2.4, far_sigmas = 5.0;
   const bool is_worse = !report.is_of_images && report.sigma_px_from == SigmaPxFrom::residuals &&
                         report.sigma_px > LocalizationFilterConfig{}.sigma_px;
-  const bool is_far = is_worse && given.name == "focal length" && moved_sigmas(given, report) > far_sigmas;
+  const bool may_be_far = given.name == "water's index" || (is_worse && given.name == "focal length");
+  const bool is_far = may_be_far && moved_sigmas(given, report) > far_sigmas;
   return supported_z(given, report.camera) / (is_far ? care_z_far : care_z);
 }
 

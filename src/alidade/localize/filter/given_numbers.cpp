@@ -29,11 +29,14 @@ GivenNumber given_number(std::string_view name, const Eigen::VectorXd& direction
 }
 
 /// A port that was not calibrated with its lens: what its observations say of it, the focal length says nearly alike,
-/// and is named.
+/// and is named. Beside a lens that is not estimated a smoothed path says of the water what neither focal length nor k1
+/// say alone.
 template <class Place, class Add>
 void add_port(const GivenSystem& system, const Place& place, const Add& add, std::vector<GivenNumber>& all) {
   const Eigen::Index gap = place("gap_m");
   if (gap < 0 || system.cov(gap, gap) > 0.0) return;
+  const bool is_smoothed = system.score.size() >= static_cast<Eigen::Index>(system.lens_params.size()) + num_causes;
+  const Eigen::Index water = is_smoothed && place("fx") >= 0 ? place("n_water") : -1;
   for (const auto& [param, name] :
        {std::pair{"n_water", "water's index"}, std::pair{"gap_m", "port's gap"},
         std::pair{"normal_x", "port's normal x"}, std::pair{"normal_y", "port's normal y"}}) {
@@ -42,7 +45,7 @@ void add_port(const GivenSystem& system, const Place& place, const Add& add, std
     const double variance = system.cov(at, at);
     add(name, Eigen::VectorXd::Unit(system.score.size(), at),
         variance > 0.0 ? std::optional(std::sqrt(variance)) : std::nullopt);
-    all.back().asked = all.back().z = 0.0;
+    if (at != water) all.back().asked = all.back().z = 0.0;
   }
 }
 

@@ -25,6 +25,22 @@ def name_shown(path: Any) -> str:
     return "".join(each if each.isprintable() else " " for each in str(path))
 
 
+def file_name(path: Any, name: str = "file") -> bytes:
+    """A path as the system's bytes, which need not be UTF-8."""
+    file = os.fsencode(path)
+    if b"\0" in file:
+        raise ValueError(f"{name}: {shown(path)} holds a zero byte, which no file's name does")
+    return file
+
+
+def folder_name(path: Any) -> bytes:
+    """Of a folder to write into: an empty one would be where the program runs."""
+    folder = file_name(path, "folder")
+    if not folder:
+        raise ValueError("folder: is empty; a folder is needed")
+    return folder
+
+
 def number(value: Any, name: str) -> float:
     """One number; whether it is finite is for who asked."""
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
@@ -37,6 +53,13 @@ def whole(value: Any, name: str) -> int:
     if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and abs(int(value)) < 1 << 31:
         return int(value)
     raise ValueError(f"{name}: a whole number is needed, not {shown(value)}")
+
+
+def plain(value: Any) -> Any:
+    """Of numpy's numbers and arrays Python's own, as json.dumps(default=plain) asks for them."""
+    if isinstance(value, (np.generic, np.ndarray)) and value.dtype.kind in "biufU":
+        return value.tolist()
+    raise TypeError(f"{shown(value)} is neither a number nor a text")
 
 
 def unmasked(values: Any) -> npt.NDArray[Any]:
@@ -70,6 +93,8 @@ def image(values: Any, name: str = "image") -> npt.NDArray[Any]:
     if isinstance(values, (str, os.PathLike)):
         raise ValueError(f"{name}: an array is needed, not a file; cv2.imread({os.fspath(values)!r}) reads one")
     array = np.asarray(values)
+    if array.dtype == np.dtype(np.uint16).newbyteorder():  # of the other order of bytes, as FITS and some TIFFs have it
+        array = array.astype(np.uint16)
     if array.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"{name}: an image is uint8 or uint16, not {array.dtype}")
     if array.ndim == 3 and array.shape[2] == 1:

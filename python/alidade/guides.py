@@ -167,7 +167,7 @@ class ShotGuide(OneByOne):
         return types.SimpleNamespace(**values)
 
 
-class ViewGuide:
+class ViewGuide(OneByOne):
     """Where to look next with heads that rotate, so that their axes become known; each solve is that of al.rig() on all views.
 
     cameras       by the number of the head: {1: a Camera or its file, …}

@@ -2,10 +2,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NoReturn
 
 from . import _alidade
-from .arrays import name_shown
+from .arrays import file_name, name_shown
 from .former import former
 from .job import Progress, files_for_call
 from .result import Result
@@ -44,6 +44,9 @@ class Head:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Head is neither copied nor pickled, as it is a connection: open another one by its URL")
 
     def close(self) -> None:
         """Stops it, and lets it go."""
@@ -109,7 +112,7 @@ class Head:
                 words.append(f"--{axis}-range={low:.9f},{high:.9f}")
         if self._password_file is not None:
             words.append(f"--password-file={self._password_file}")
-        return Result(_alidade.run_command(["head", self._url, "--move", *words], progress))
+        return Result(_alidade.run_command([file_name(word, "head") for word in ("head", self._url, "--move", *words)], progress))
 
 
 def _range(limits: tuple[float, float] | None, name: str) -> tuple[float, float] | None:

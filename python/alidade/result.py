@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, Callable
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers
+from .arrays import Numbers, folder_name, name_shown
 from .camera import Camera
 from .errors import CannotDetermine, NoConvergence, NotTrusted
+from .kept import Kept, files_beside
 from .tables import of_csv, of_tum, structured
 from .words import suggestion
 
@@ -70,43 +71,6 @@ class Verdict:
         return f"{SYMBOLS[self.state]} {self.sentence}{after}"
 
 
-class _Kept:
-    """Files as an earlier run left them, in the shape of _alidade.Outcome."""
-
-    def __init__(self, files: dict[str, bytes], lines: list[str], camera: Camera | None = None,
-                 model_covariance: Numbers | None = None) -> None:
-        self.all_files, self.lines = files, lines
-        self.camera = None if camera is None else camera._core
-        self.model_covariance = np.zeros((0, 0)) if model_covariance is None else model_covariance
-        try:
-            self.document = json.loads(files["result.json"])
-        except ValueError as error:
-            raise ValueError(f"result.json: is no JSON: {error}") from None
-        if not isinstance(self.document, dict) or self.document.get("schema") != "alidade-result/1":
-            raise ValueError("result.json: is no result of alidade")
-        self.tables = list(self.document["data"])
-        self.grids = list(self.document["grids"])
-        self.files = [name for name in files if name not in ("result.json", "report.html")]
-
-    def header(self) -> str:
-        return json.dumps({key: value for key, value in self.document.items() if key not in ("data", "grids")})
-
-    def table(self, name: str) -> list[tuple[str, Any]]:
-        return list(self.document["data"][name].items())
-
-    def grid(self, name: str) -> dict[str, Any]:
-        grid = self.document["grids"][name]
-        shape = grid["rows"], grid["cols"]
-        return {key: np.array(value, dtype=float).reshape(shape) if isinstance(value, list) else value
-                for key, value in grid.items() if key not in ("rows", "cols")}
-
-    def file(self, name: str) -> bytes:
-        return self.all_files[name]
-
-    def save(self, folder: str) -> None:
-        _alidade.save_files(list(self.all_files.items()), self.document["verdict"]["exit_code"], folder)
-
-
 class Tables(abc.Mapping[str, "np.ndarray[Any, Any]"]):
     """Tables by name, structured arrays: `pandas.DataFrame(r.tables["corners"])`. Those of the document, and the CSV (and
     TUM) files beside it."""
@@ -156,8 +120,17 @@ class Tables(abc.Mapping[str, "np.ndarray[Any, Any]"]):
     def __len__(self) -> int:
         return len(list(iter(self)))
 
+    def __reduce__(self) -> tuple[Callable[..., Tables], tuple[dict[str, np.ndarray[Any, Any]]]]:
+        return _held_tables, (dict(self),)
+
     def __repr__(self) -> str:
         return f"Tables({', '.join(self)})"
+
+
+def _held_tables(tables: dict[str, np.ndarray[Any, Any]]) -> Tables:
+    held = Tables(types.SimpleNamespace(tables=list(tables), files=[]))
+    held._made = tables
+    return held
 
 
 class Grids(abc.Mapping[str, "dict[str, Any]"]):
@@ -176,6 +149,13 @@ class Grids(abc.Mapping[str, "dict[str, Any]"]):
 
     def __len__(self) -> int:
         return len(self._source.grids)
+
+    def __reduce__(self) -> tuple[Callable[..., Grids], tuple[dict[str, dict[str, Any]]]]:
+        return _held_grids, (dict(self),)
+
+
+def _held_grids(grids: dict[str, dict[str, Any]]) -> Grids:
+    return Grids(types.SimpleNamespace(grids=list(grids), grid=grids.__getitem__))
 
 
 def _value(value: Any) -> Any:
@@ -240,7 +220,7 @@ class Result:
         count = len(self.parameter_names)
         square = np.zeros((count, count))
         rows, cols = np.triu_indices(count)
-        square[rows, cols] = self._document["covariance"]["upper"]
+        square[rows, cols] = np.array(self._document["covariance"]["upper"], dtype=np.float64)  # null: NaN
         square[cols, rows] = square[rows, cols]
         return square
 
@@ -302,7 +282,7 @@ class Result:
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Leaves in the folder what the command leaves there: result.json, the files, report.html; all at once or none."""
-        self._source.save(os.fspath(folder))
+        self._source.save(folder_name(folder))
 
     def report(self) -> Report:
         """The page of the result, to be seen in a notebook; str() is its HTML."""
@@ -313,11 +293,11 @@ class Result:
         return json.loads(self._saved()["result.json"])
 
     def _saved(self) -> dict[str, bytes]:
-        if isinstance(self._source, _Kept):
+        if isinstance(self._source, Kept):
             return self._source.all_files
         with tempfile.TemporaryDirectory(prefix="alidade-") as folder:
             self.save(folder)
-            return _files_beside(pathlib.Path(folder) / "result.json")
+            return files_beside(pathlib.Path(folder) / "result.json")
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and name in self.estimate:
@@ -387,23 +367,9 @@ class Report:
         return f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="800" frameborder="0"></iframe>'
 
 
-def _files_beside(result: pathlib.Path) -> dict[str, bytes]:
-    """A result's files by name: result.json first, then those it names, then the page."""
-    if not result.is_file():
-        raise ValueError("there is no such file")
-    files = {"result.json": result.read_bytes()}
-    document = json.loads(files["result.json"])
-    if "verdict" not in document:
-        raise ValueError("it has no verdict")
-    for name in [*document.get("files", []), "report.html"]:
-        if (result.parent / name).is_file():
-            files[name] = (result.parent / name).read_bytes()
-    return files
-
-
 def _of_files(files: dict[str, bytes], lines: list[str], camera: Camera | None = None,
               model_covariance: Numbers | None = None) -> Result:
-    return Result(_Kept(files, lines, camera, model_covariance))
+    return Result(Kept(files, lines, camera, model_covariance))
 
 
 def read_result(path: str | os.PathLike[str]) -> Result:
@@ -412,7 +378,9 @@ def read_result(path: str | os.PathLike[str]) -> Result:
     if result.is_dir():
         result = result / "result.json"
     try:
-        files = _files_beside(result)
-    except (ValueError, AttributeError, TypeError, OSError) as error:
-        raise ValueError(f"{path}: is no result of alidade: {error}") from None
-    return _of_files(files, [])
+        files = files_beside(result)
+        return _of_files(files, [])
+    except OSError as error:
+        raise ValueError(f"{name_shown(path)}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise ValueError(f"{name_shown(path)}: is no result of alidade: {error}") from None

@@ -50,7 +50,10 @@ std::string in_keywords(std::string text) {
 /// What is wrong with the input is a ValueError, in the one line that the command prints.
 void translate(std::exception_ptr thrown) {
   const auto wrong = [](const char* what) {
-    PyErr_SetString(PyExc_ValueError, in_keywords(cli::one_line(what)).c_str());
+    const std::string text = in_keywords(cli::one_line(what));
+    const auto said = py::reinterpret_steal<py::object>(
+        PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));  // names may be no UTF-8
+    PyErr_SetObject(PyExc_ValueError, said.ptr());
   };
   try {
     if (thrown) std::rethrow_exception(thrown);
@@ -64,6 +67,20 @@ void translate(std::exception_ptr thrown) {
     wrong((error.path1().string() + ": " + error.code().message()).c_str());
   } catch (const cv::Exception& error) {
     PyErr_SetString(PyExc_RuntimeError, ("internal: OpenCV: " + error.err + " (a bug in alidade)").c_str());
+  }
+}
+
+/// A core is neither copied nor pickled, what holds it sees to that: where nothing did, pickle's protocols 0 and 1
+/// ended the process.
+void refuse_pickles(const py::module_& module) {
+  for (const auto& [name, value] : py::dict(module.attr("__dict__"))) {
+    if (!py::isinstance<py::type>(value) || PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(value.ptr()),
+                                                             reinterpret_cast<PyTypeObject*>(PyExc_Exception)) != 0)
+      continue;
+    const std::string said =
+        "an object of alidade._alidade." + std::string(py::str(name)) + " is neither copied nor pickled";
+    const auto refuse = [said](const py::object&, int) -> py::object { throw py::type_error(said); };
+    value.attr("__reduce_ex__") = py::cpp_function(refuse, py::is_method(value));
   }
 }
 
@@ -88,6 +105,7 @@ PYBIND11_MODULE(_alidade, module) {
   bind_images(module);
   bind_live(module);
   bind_localizer(module);
+  refuse_pickles(module);
 }
 
 }  // namespace alidade::python

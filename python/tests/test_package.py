@@ -11,7 +11,7 @@ import unittest
 import numpy as np
 
 import alidade as al
-from common import BOARD, board_corners, command
+from common import BOARD, TRUE_CAMERA, assert_same_table, board_corners, command
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -61,6 +61,36 @@ class Package(unittest.TestCase):
                       ("9x6", 0.025, "charuco"), (object(), 0.025)):
             with self.subTest(wrong=wrong), self.assertRaises((ValueError, TypeError)):
                 al.Board(*wrong)
+
+    def test_what_is_public_is_pickled_and_copied_or_refused_in_one_line(self):
+        """Tables and grids ended the process (protocols 0 and 1), or named the module's core; a ViewGuide's copy was the same guide."""
+        import copy
+        import pickle
+        result = al.calibrate(corners=board_corners(8), size=(640, 480), board=BOARD)
+        detection, finder = al.find_board(np.zeros((48, 64), np.uint8), BOARD), al.BoardFinder(BOARD)
+        values = (result, result.verdict, result.verdict.checks[0], result.tables, result.grids, result.camera, result.plot, result.report(), BOARD,
+                  detection, finder, al.Interrupted("x"), al.CannotDetermine("y"))
+        streams = (al.CaptureGuide(BOARD), al.ShotGuide(TRUE_CAMERA, BOARD), al.ViewGuide({1: TRUE_CAMERA}, BOARD), al.Observer((640, 480)),
+                   al.Localizer(TRUE_CAMERA), al.Head("sim://?seed=3"))
+        works = [copy.copy, copy.deepcopy, *(lambda value, protocol=protocol: pickle.loads(pickle.dumps(value, protocol)) for protocol in range(2, 6))]
+        for work in works:
+            for value in values:
+                self.assertIs(type(work(value)), type(value))
+            for tables in (work(result.tables), work(work(result.tables))):
+                self.assertEqual(list(tables), list(result.tables))
+                for name in tables:
+                    assert_same_table(tables[name], result.tables[name], name)
+            grids = work(result.grids)
+            self.assertEqual(list(grids), list(result.grids))
+            for name in grids:
+                np.testing.assert_equal(grids[name], result.grids[name])
+        for protocol in (0, 1):
+            self.assertEqual(pickle.loads(pickle.dumps(result, protocol)), result)
+            self.assertEqual(list(pickle.loads(pickle.dumps(result.tables, protocol))), list(result.tables))
+        for one in (*streams, *(each._core for each in streams if each._core is not None), result._source):
+            for work in (copy.copy, copy.deepcopy, *(lambda value, protocol=protocol: pickle.dumps(value, protocol) for protocol in range(6))):
+                with self.subTest(one=type(one)), self.assertRaisesRegex(TypeError, r"is neither copied nor pickled[^\n]*$"):
+                    work(one)
 
     def test_code_of_the_docs_runs(self):
         blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(), re.S)

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <utility>
 
@@ -58,6 +59,20 @@ std::vector<std::string> port_faults(const CalibrateConfig& config) {
   return {};
 }
 
+/// What is wrong with given points of a board, whatever its shape; empty where nothing is.
+std::string points_fault(const std::vector<Eigen::Vector3d>& points) {
+  constexpr double max_m = 1e6;
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].allFinite()) return fmt::format("board_points: point {} is not finite", i);
+    const double far_m = points[i].cwiseAbs().maxCoeff();
+    if (far_m > max_m) return fmt::format("board_points: point {} is {:.3g} m away; they are in metres", i, far_m);
+    spread += (points[i] - points.front()) * (points[i] - points.front()).transpose();
+  }
+  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();  // ascending
+  return squares[1] > 1e-8 * squares[2] ? "" : "board_points: they all lie on one line, or in one place";
+}
+
 /// Throws ConfigError with every fault of what was asked.
 void require_sense(CalibrateConfig config, const Board& board) {
   std::vector<std::string> found = faults_of(fields_of(config));
@@ -67,6 +82,9 @@ void require_sense(CalibrateConfig config, const Board& board) {
   if (config.board_shape == BoardShape::given && num_given != num_points(board)) {
     found.push_back("the board has " + std::to_string(num_points(board)) + " points, but " + std::to_string(num_given) +
                     " are given");
+  } else if (config.board_shape == BoardShape::given) {
+    if (std::string of_points = points_fault(config.board_points); !of_points.empty())
+      found.push_back(std::move(of_points));
   }
   if (config.board_shape != BoardShape::given && num_given > 0)
     found.emplace_back("board_points are of BoardShape::given, and another shape is asked for");

@@ -1,5 +1,7 @@
 #include "alidade/board/dictionary.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 
@@ -75,6 +77,9 @@ std::string fault(const Board& board) {
            std::to_string(board.cols) + "x" + std::to_string(board.rows);
   }
   if (!(std::isfinite(board.square_m) && board.square_m > 0.0)) return "the pitch of a board is larger than 0";
+  constexpr double min_m = 1e-9, max_m = 1e6;  // millimetres or micrometres that are taken for metres: no fault yet
+  if (board.square_m < min_m || board.square_m > max_m)
+    return fmt::format("the pitch of a board is in metres, and not {:.3g}", board.square_m);
   switch (board.kind) {
     case BoardKind::chessboard:
       return {};

@@ -105,6 +105,33 @@ TEST(CalibrateFace, AnswersACornerGivenTwiceAndPointsOfNoShape) {
   EXPECT_THAT(fault_of(config), ::testing::HasSubstr("BoardShape::given"));
 }
 
+/// They were "only 15 usable photos of the board; it takes 3", exit 4.
+TEST(CalibrateFace, AnswersBoardsThatCannotBe) {
+  const auto fault_with = [](const auto& changed) {
+    CalibrateConfig config;
+    config.board_shape = BoardShape::given;
+    config.board_points = points_in_board(sample_board);
+    for (Eigen::Vector3d& point : config.board_points) point = changed(point);
+    return fault_of(config);
+  };
+  const auto times = [&](double scale) {
+    return fault_with([scale](const Eigen::Vector3d& X) { return Eigen::Vector3d(scale * X); });
+  };
+  EXPECT_EQ(fault_with([](const Eigen::Vector3d& X) -> Eigen::Vector3d { return X; }), "");
+  EXPECT_EQ(times(std::nan("")), "board_points: point 0 is not finite");
+  EXPECT_THAT(times(1e300), ::testing::HasSubstr("m away; they are in metres"));
+  EXPECT_EQ(times(0.0), "board_points: they all lie on one line, or in one place");
+  EXPECT_EQ(fault_with([](const Eigen::Vector3d& X) -> Eigen::Vector3d {
+              return {X.x(), 2.0 * X.x(), 0.0};
+            }),
+            "board_points: they all lie on one line, or in one place");
+  for (const double square_m : {1e300, 1e-300}) {
+    Board board = sample_board;
+    board.square_m = square_m;
+    EXPECT_THAT(fault_of({}, board), ::testing::HasSubstr("the pitch of a board is in metres, and not 1e")) << square_m;
+  }
+}
+
 /// Whether the verdict of that calibration has a check of that name that is not good.
 bool is_named(const std::string& name, const std::vector<BoardView>& views, const ImageSize& size, const Board& board) {
   const Verdict verdict = calibrate(views, size, board).verdict;

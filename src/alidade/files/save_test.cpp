@@ -45,5 +45,8 @@ TEST(Save, ARefusalDoesNotReplaceAnEstimate) {
   EXPECT_EQ(result_in(folder.path() / "refused")["verdict"]["exit_code"], 4);
 }
 
+/// It was the current folder.
+TEST(Save, NeedsAFolder) { EXPECT_THROW(save(outcome_of(Calibration{}), ""), InputError); }
+
 }  // namespace
 }  // namespace alidade

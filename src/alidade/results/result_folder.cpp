@@ -108,6 +108,7 @@ void settle(ResultDocument& document) {
 }
 
 void save(JobOutcome outcome, const std::filesystem::path& folder) {
+  if (folder.empty()) throw InputError("folder: is empty; a folder is needed");
   ResultDocument& document = outcome.document;
   settle(document);
   if (document.created_utc.empty()) document.created_utc = utc_now();

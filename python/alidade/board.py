@@ -8,7 +8,7 @@ from typing import Any, Callable
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers
+from .arrays import Numbers, file_name
 from .arrays import image as pixels_of
 from .former import former
 from .words import texts_of
@@ -142,7 +142,7 @@ def find_board(image: Any, board: Board) -> BoardDetection:
     if not isinstance(board, Board):
         raise ValueError(f"board: an alidade.Board is needed, not {type(board).__name__}")
     if isinstance(image, (str, os.PathLike)):
-        return BoardDetection(*_alidade.find_in_file(os.fspath(image), board._core))
+        return BoardDetection(*_alidade.find_in_file(file_name(image, "image"), board._core))
     return BoardDetection(*_alidade.find_in_image(pixels_of(image), board._core))
 
 

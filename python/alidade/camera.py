@@ -9,7 +9,7 @@ from typing import Any, Callable
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image_size, numbers, vectors
+from .arrays import Numbers, file_name, image_size, numbers, vectors
 from .arrays import image as pixels_of
 from .former import former
 from .words import suggestion
@@ -54,12 +54,12 @@ class Camera:
     @classmethod
     def read(cls, file: str | os.PathLike[str]) -> Camera:
         """A camera file of any known format: alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP. "camchain.yaml:cam1" chooses."""
-        return cls._of(_alidade.read_camera(os.fspath(file)))
+        return cls._of(_alidade.read_camera(file_name(file)))
 
     def write(self, file: str | os.PathLike[str], format: str = "alidade", *, lossy: bool = False) -> None:
         """Writes "alidade", "opencv", "ros", "kalibr", "mrcal" or "colmap". What the format cannot hold is a ValueError,
         unless `lossy`."""
-        self._core.write(os.fspath(file), format, lossy)
+        self._core.write(file_name(file), format, lossy)
 
     @classmethod
     def from_opencv(cls, K: Any, dist: Any = None, size: tuple[int, int] = (0, 0), covariance: Any = None, *,

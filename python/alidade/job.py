@@ -14,7 +14,7 @@ from typing import Any, Callable, Union
 import numpy as np
 
 from . import _alidade
-from .arrays import image, image_size, name_shown, numbers
+from .arrays import file_name, image, image_size, name_shown, numbers, plain
 from .board import Board
 from .camera import Camera
 from .result import Result
@@ -82,7 +82,7 @@ class _Files:
 
     def _put(self, name: str, ending: str, text: str) -> str:
         file = self.folder / f"{name}{len(self.names)}{ending}"
-        file.write_text(text)
+        file.write_text(text, encoding="utf-8", errors="surrogateescape")  # it may name files
         self.names.append((str(file), name))
         return str(file)
 
@@ -124,7 +124,7 @@ class _Files:
         folder or the file of that name in it."""
         if isinstance(value, abc.Mapping) and not all(_is_column(each) for each in value.values()):
             try:
-                return self._put(name, ".yaml", json.dumps(value))  # which is YAML as well
+                return self._put(name, ".yaml", json.dumps(value, default=plain))  # which is YAML as well
             except TypeError as error:
                 raise ValueError(f"{name}: {error}") from None
         if is_table(value):
@@ -187,6 +187,8 @@ def run_command(command: str, function: Callable[..., Any], values: dict[str, An
                 words += [option] if value else []
                 continue
             texts = files.texts_of(_globbed(value) if not option else value, name, form)
+            for text in texts:
+                file_name(text, name)  # by its keyword, where it holds a zero byte
             if not option:
                 if any(text.startswith("-") for text in texts):
                     raise ValueError(f"{name}: {texts[0]!r} is no file")
@@ -201,7 +203,7 @@ def run_command(command: str, function: Callable[..., Any], values: dict[str, An
             if not isinstance(board, Board):
                 raise ValueError(f"board: an alidade.Board is needed, not {type(board).__name__}")
             words += [f"{option}={text}" for option, text in board._core.options.items()]
-        outcome = _alidade.run_command([*command.split(), *arguments, *words], progress)
+        outcome = _alidade.run_command([*command.split(), *map(os.fsencode, (*arguments, *words))], progress)
         outcome.rename_inputs(files.names)
     return Result(outcome)
 
@@ -271,7 +273,7 @@ def _from_photos(photos: Any, size: Any, rest: tuple[Any, ...]) -> Result:
     if paths is not None:
         if not paths:
             raise ValueError("photos: there are none")
-        return Result(_alidade.calibrate_files(paths, *rest))
+        return Result(_alidade.calibrate_files([file_name(each, "photos") for each in paths], *rest))
     images = [image(each, f"photos[{i}]") for i, each in enumerate(photos)]
     if size is not None and images[0].shape[1::-1] != image_size(size):
         raise ValueError(f"the photos are {images[0].shape[1]}x{images[0].shape[0]}, not as size says")
@@ -285,7 +287,7 @@ def _from_corners(take: dict[str, Any], board: Board, rest: tuple[Any, ...]) -> 
         if take["sigma_px"] is not None:
             raise ValueError("sigma_px: a table of corners has columns sigma_u_px, sigma_v_px for it")
         with files_for_call() as files:
-            file = files.path_of(corners, "corners")
+            file = file_name(files.path_of(corners, "corners"), "corners")
             return Result(_alidade.calibrate_corner_file(file, bool(take["skip_bad"]), size, *rest))
     pixels = numbers(corners, "corners")
     if pixels.ndim == 4 and pixels.shape[2] == 1:  # (N, P, 1, 2), as OpenCV has them

@@ -6,7 +6,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image_size, number, numbers, vectors, whole
+from .arrays import Numbers, file_name, image_size, number, numbers, vectors, whole
 from .arrays import image as pixels_of
 from .camera import Camera
 from .former import former
@@ -44,7 +44,7 @@ class Tracker(OneByOne):
     def __init__(self, rig: Any, **fields: Any) -> None:
         with files_for_call() as files:
             texts = [(name, texts_of(value, name)) for name, value in fields.items() if value is not None]
-            self._core = _alidade.Tracker(files.path_of(rig, "rig"), texts)
+            self._core = _alidade.Tracker(file_name(files.path_of(rig, "rig"), "rig"), texts)
 
     def push(self, head: int, pan_tilt_rad: Any, px: Any, t_capture_s: float, t_arrival_s: float | None = None, *,
              sigma_px: float = 0.0) -> dict[str, Any]:
@@ -147,9 +147,8 @@ class Localizer(OneByOne):
     def _begin(self, is_of_images: bool) -> _alidade.Localizer:
         if self._core is None:
             with files_for_call() as files:
-                target = "" if self._target is None else files.path_of(self._target, "target")
-                start = "" if self._start is None else files.path_of(self._start, "start")
-                saved = "" if self._map is None else files.path_of(self._map, "map")
+                target, start, saved = (b"" if value is None else file_name(files.path_of(value, name), name) for value, name in
+                                        ((self._target, "target"), (self._start, "start"), (self._map, "map")))
                 self._core = _alidade.Localizer(self._camera._core, target, is_of_images, start, saved, self._texts)
         return self._core
 

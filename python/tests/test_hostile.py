@@ -1,5 +1,9 @@
 """Whatever comes in is answered or refused in one line; many threads, and many calls, leave nothing."""
+import copy
+import json
+import os
 import re
+import shutil
 import threading
 import unittest
 
@@ -90,6 +94,85 @@ class Hostile(InFolder):
                     work()
                 self.assertTrue(str(caught.exception).isprintable(), str(caught.exception))
 
+    def test_names_of_files_need_not_be_utf_8(self):
+        """They were a TypeError of many lines, though glob and the command have them."""
+        name = os.fsdecode(b"caf\xe9")
+        photos, rig, camera = self.folder / name, self.folder / f"{name}.yaml", self.folder / f"camera_{name}.yaml"
+        al.simulate.board(photos=6, size=(640, 480), board=BOARD).save(photos)
+        shutil.copy(self.rig, rig)
+        TRUE_CAMERA.write(camera)
+        files = sorted(str(each) for each in photos.glob("*.png"))
+        for given in (str(photos), photos, files, f"{photos}/*.png"):
+            result = al.calibrate(given, board=BOARD)
+            self.assertEqual(result.counts["used"], 6)
+        result.save(self.folder / f"{name}_out")
+        self.assertEqual(al.read_result(self.folder / f"{name}_out").estimate, result.estimate)
+        al.read_result(self.folder / f"{name}_out").save(self.folder / f"{name}_again")
+        self.assertTrue(al.find_board(files[0], BOARD))
+        self.assertEqual(len(al.corners(files, board=BOARD).tables["corners"]), 6 * 54)
+        events = self.events.tables["events"]
+        self.assertEqual(al.track(events, rig=rig).estimate, al.track(events, rig=self.rig).estimate)
+        self.assertIsNotNone(al.Tracker(rig))
+        self.assertEqual(al.Camera.read(camera), TRUE_CAMERA)
+        shots = {"range_m": [1.0, 2.0], "photo": files[:2]}
+        for work in (lambda: al.Camera.read(name), lambda: al.track(events, rig=name), lambda: al.calibrate(name, board=BOARD),
+                     lambda: al.find_board(name, BOARD), lambda: al.calibrate(corners=name, board=BOARD),
+                     lambda: al.rangefinder(shots, camera=camera, board=BOARD).require()):
+            with self.assertRaises((ValueError, al.EstimateError)) as caught:
+                work()
+            self.assertRegex(str(caught.exception), r"^[^\n\ud800-\udfff]+$")
+
+    def test_a_zero_byte_is_of_no_name(self):
+        """It ended the name, and the message."""
+        result, board = self.events, dict(board=BOARD)
+        for work in (lambda: al.Camera.read("a\0b"), lambda: al.track("a\0b", rig=self.rig), lambda: al.track("a", rig="a\0b"),
+                     lambda: al.calibrate("a\0b", **board), lambda: al.calibrate(["a\0b"], **board), lambda: al.find_board("a\0b", BOARD),
+                     lambda: al.Tracker("a\0b"), lambda: result.save("a\0b"), lambda: TRUE_CAMERA.write("a\0b"),
+                     lambda: al.calibrate(corners="a\0b", **board)):
+            with self.assertRaises(ValueError) as caught:
+                work()
+            self.assertRegex(str(caught.exception), r"^\w+: 'a\\x00b' holds a zero byte, which no file's name does$")
+
+    def test_a_result_is_left_in_a_folder_that_has_a_name(self):
+        """An empty one was the current folder."""
+        self.events.save(self.folder / "saved")
+        for result in (self.events, al.read_result(self.folder / "saved")):
+            self.refusals([(lambda: result.save(""), "folder: is empty; a folder is needed")])
+
+    def test_a_result_that_lacks_something_is_refused_when_it_is_read(self):
+        """It was a KeyError, an AttributeError or a TypeError later."""
+        folder = self.folder / "damaged"
+        al.simulate.rotation(points=6, seed=3, duration=2).save(folder / "log")
+        al.observe(folder / "log" / "log.csv", size=(780, 582)).save(folder)
+        whole = json.loads((folder / "result.json").read_text())
+
+        def with_change(path, change):
+            document = copy.deepcopy(whole)
+            inner = document
+            for key in path[:-1]:
+                inner = inner[key]
+            change(inner, path[-1])
+            (folder / "result.json").write_text(json.dumps(document))
+
+        def use():
+            result = al.read_result(folder)
+            return (repr(result), result.verdict, result.command, result.estimate, result.stddev, result.stddev_model, result.counts, result.assumed,
+                    result.covariance, dict(result.tables), dict(result.grids), result.files, dir(result), result.verdict.checks)
+
+        self.assertTrue(use())
+        must = {"command", "estimate", "stddev", "stddev_model", "covariance", "verdict", "data", "grids", "files", "counts", "assumed"}
+        paths = [(key,) for key in whole] + [(key, each) for key in ("verdict", "covariance") for each in whole[key]]
+        paths += [("data", each) for each in whole["data"]] + [("grids", each) for each in whole["grids"]]
+        for path in paths:
+            for change in (dict.__delitem__, *(lambda inner, key, value=value: inner.__setitem__(key, value) for value in (None, -1, "x", [1], {"y": 3}))):
+                with_change(path, change)
+                with self.subTest(path=path):
+                    try:
+                        use()
+                        self.assertFalse(change is dict.__delitem__ and (path[0] in must and len(path) == 1 or path[0] in ("verdict", "covariance")))
+                    except ValueError as error:
+                        self.assertRegex(str(error), rf"^{folder}: is no result of alidade: result.json: [^\n]+$")
+
     def refusals(self, cases):
         for work, said in cases:
             with self.assertRaises(ValueError) as caught:
@@ -123,6 +206,12 @@ class Hostile(InFolder):
         self.assertTrue(by_values.verdict)
         self.assertEqual(by_values.estimate, by_file.estimate)
 
+    def test_numbers_of_numpy_are_numbers_in_nested_values(self):
+        """Object of type int64 is not JSON serializable."""
+        plain = {"duration_s": 3.0, "seeds": 1, "hidden_s": [2.2, 2.4]}
+        both = [al.servo(each).estimate for each in (plain, {"duration_s": np.float32(3.0), "seeds": np.int64(1), "hidden_s": np.array([2.2, 2.4])})]
+        self.assertEqual(*both)
+
     def test_layouts_and_read_only_arrays(self):
         corners = board_corners(num_views=8)
         expected = al.calibrate(corners=corners, size=TRUE_CAMERA.size, board=BOARD).camera.parameters
@@ -132,6 +221,9 @@ class Hostile(InFolder):
             np.testing.assert_array_equal(al.calibrate(corners=same, size=TRUE_CAMERA.size, board=BOARD).camera.parameters, expected)
         image = np.random.default_rng(1).integers(0, 255, (480, 1280), dtype=np.uint8)
         self.assertEqual(al.find_board(image[:, ::2], BOARD).reason, al.find_board(image[:, ::2].copy(), BOARD).reason)
+        deep = image[:, ::2].astype(np.uint16) * 257
+        self.assertEqual(al.find_board(deep.astype(">u2"), BOARD).reason, al.find_board(deep, BOARD).reason)
+        np.testing.assert_array_equal(TRUE_CAMERA.undistort(deep.astype(">u2")), TRUE_CAMERA.undistort(deep))
         big_endian = corners.astype(">f8")
         np.testing.assert_array_equal(al.calibrate(corners=big_endian, size=TRUE_CAMERA.size, board=BOARD).camera.parameters, expected)
 

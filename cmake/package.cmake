@@ -3,6 +3,23 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
+# Eigen aligns what it lays out and allocates by the instructions that a compiler may use: who builds on the library with
+# others (-march=native, a sanitizer) must lay out as the library does.
+get_directory_property(options COMPILE_OPTIONS)
+separate_arguments(flags UNIX_COMMAND "${CMAKE_CXX_FLAGS}")
+get_target_property(eigen_include Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
+list(TRANSFORM eigen_include PREPEND -I)
+file(WRITE ${PROJECT_BINARY_DIR}/eigen_layout.cpp
+     "#include <Eigen/Core>\nlayout EIGEN_MAX_ALIGN_BYTES EIGEN_MALLOC_ALREADY_ALIGNED\n")
+execute_process(COMMAND ${CMAKE_CXX_COMPILER} ${flags} ${options} ${eigen_include} -std=c++20 -E
+                        ${PROJECT_BINARY_DIR}/eigen_layout.cpp OUTPUT_VARIABLE preprocessed ERROR_QUIET)
+set(eigen_layout "")
+if(preprocessed MATCHES "layout ([0-9]+) ([01])")
+  set(eigen_layout EIGEN_MAX_ALIGN_BYTES=${CMAKE_MATCH_1} EIGEN_MALLOC_ALREADY_ALIGNED=${CMAKE_MATCH_2})
+endif()
+list(TRANSFORM eigen_layout PREPEND -D OUTPUT_VARIABLE eigen_layout_flags)
+list(JOIN eigen_layout_flags " " eigen_layout_flags)
+
 add_library(alidade_shared SHARED $<TARGET_OBJECTS:alidade> $<TARGET_OBJECTS:alidade_light>)
 if(ALIDADE_WEB)
   target_sources(alidade_shared PRIVATE $<TARGET_OBJECTS:alidade_template>)
@@ -10,6 +27,7 @@ endif()
 set_target_properties(alidade_shared PROPERTIES OUTPUT_NAME alidade EXPORT_NAME alidade LINKER_LANGUAGE CXX
                                                 VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 target_compile_features(alidade_shared INTERFACE cxx_std_20)
+target_compile_definitions(alidade_shared INTERFACE ${eigen_layout})
 target_include_directories(alidade_shared INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
                                                     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_link_libraries(alidade_shared PUBLIC Eigen3::Eigen

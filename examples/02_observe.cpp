@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
     std::printf("%8.3f s  %-8s fx %.2f\n", step.t_s, event.c_str(), step.estimate.fx);
   }
 
-  // The same report as observer.finish(), of the whole log.
+  // The same report as observer.finish() where the log has no truth, of the whole log.
   const alidade::ObserveReport result = alidade::observe(log, config);
   std::puts(result.verdict.sentence.c_str());
   for (const alidade::ObservedQuantity& quantity : result.quantities)

@@ -40,7 +40,7 @@ bool has_result(const fs::path& folder) {
 
 Shown shown_of(const std::string& name, const fs::path& folder) {
   const auto json = nlohmann::json::parse(read_file(folder / "result.json"), nullptr, false);
-  if (!json.is_object() || json.value("schema", "") != "alidade-result/1")
+  if (!json.is_object() || !json.contains("schema") || json["schema"] != "alidade-result/1")
     throw InputError((folder / "result.json").string() + ": is not a result of alidade");
   const auto verdict = json.value("verdict", nlohmann::json::object());
   const auto word = [&](const char* key) {

@@ -94,28 +94,10 @@ void require_sense(CalibrateConfig config, const Board& board) {
   if (!sentence.empty()) throw ConfigError(sentence);
 }
 
-/// What is wrong with a corner; empty where nothing is.
-std::string corner_fault(const Corner& corner, int num_points) {
-  if (corner.index < 0 || corner.index >= num_points) {
-    return "the board has " + std::to_string(num_points) + " points, numbered from 0";
-  }
-  const bool is_finite = corner.px.allFinite() && corner.cov.allFinite();
-  const bool is_covariance = is_finite && corner.cov(0, 0) > 0.0 && corner.cov.determinant() > 0.0;
-  return is_covariance ? "" : "its position must be finite, and its covariance positive definite";
-}
-
 void require_sense(std::span<const BoardView> views, const ImageSize& size, const Board& board) {
   if (size.width_px < 1 || size.height_px < 1) throw ConfigError("the size of the images must be given");
-  for (const BoardView& view : views) {
-    std::vector<bool> seen(static_cast<std::size_t>(num_points(board)));
-    for (const Corner& corner : view.corners) {
-      const std::string what = corner_fault(corner, num_points(board));
-      if (!what.empty()) throw ConfigError(fmt::format("{}: corner {}: {}", view.photo, corner.index, what));
-      std::vector<bool>::reference is_seen = seen[static_cast<std::size_t>(corner.index)];
-      if (is_seen) throw ConfigError(fmt::format("{}: corner {} appears twice", view.photo, corner.index));
-      is_seen = true;
-    }
-  }
+  for (const BoardView& view : views)
+    if (const std::string what = corners_fault(view, num_points(board)); !what.empty()) throw ConfigError(what);
 }
 
 /// A few corners outside the images may be wrong ones.

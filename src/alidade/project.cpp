@@ -220,14 +220,7 @@ void require_camera(const Camera& camera) {
 }
 
 void require_sense(const Beam& beam, const std::vector<double>& ranges_m) {
-  constexpr double off = 1e-6;  // of a unit vector
-  const bool is_ray = beam.origin_in_cam.allFinite() && std::abs(beam.direction_in_cam.norm() - 1.0) < off;
-  if (!is_ray || !std::isfinite(beam.scale) || beam.scale == 0.0)
-    throw ConfigError("a beam has a finite origin, a direction of length one and a scale other than zero");
-  if (!beam.cov.allFinite() || !beam.cov_with_lens.allFinite() ||
-      (beam.cov_with_lens.size() > 0 && beam.cov_with_lens.rows() != num_beam_params))
-    throw ConfigError("the beam's covariance is not finite, or not of its six parameters");
-  if (!is_covariance(beam.cov)) throw ConfigError("the beam's covariance has a negative variance");
+  if (const std::string of_beam = fault(beam); !of_beam.empty()) throw ConfigError(of_beam);
   if (ranges_m.empty()) throw ConfigError("there are no readings");
   for (const double range_m : ranges_m)
     if (!(range_m > 0.0 && range_m <= max_length_m))
@@ -303,6 +296,16 @@ FieldList fields_of(ProjectConfig& config) {
            .option = "--sigma-range-m"}};
 }
 
+/// Whether errors of beam and lens can go together as the beam says: of the camera that it was calibrated with, not of
+/// one that is known better, or of another calibration.
+bool is_of_lens(const Beam& beam, const Camera& camera) {
+  const Eigen::Index num_lens = camera.cov.rows();
+  if (beam.cov_with_lens.cols() != num_lens) return false;
+  Eigen::MatrixXd joint(num_beam_params + num_lens, num_beam_params + num_lens);
+  joint << beam.cov, beam.cov_with_lens, beam.cov_with_lens.transpose(), camera.cov;
+  return is_covariance(joint);
+}
+
 BeamProjection project_readings(const Beam& beam, const Camera& camera, const std::vector<double>& ranges_m,
                                 const ProjectConfig& config) {
   ProjectConfig used = config;
@@ -312,8 +315,8 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
   require_camera(camera);
   if (config.own_camera) require_camera(*config.own_camera);
   BeamProjection result{.readings = {}, .beam = beam, .camera = camera, .assumed = {}, .counts = {}, .verdict = {}};
-  // A covariance with another lens' parameters is of another calibration.
-  if (beam.cov_with_lens.cols() != camera.cov.cols()) result.beam.cov_with_lens.resize(0, 0);
+  const bool is_other_lens = beam.cov_with_lens.size() > 0 && !is_of_lens(beam, camera);
+  if (is_other_lens) result.beam.cov_with_lens.resize(0, 0);
   for (const double range_m : ranges_m)
     result.readings.push_back({range_m, measured_point(result.beam, range_m, config.sigma_range_m),
                                measured_pixel(result.beam, camera, range_m, config.sigma_range_m)});
@@ -332,6 +335,11 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
        result.verdict);
   heed_assumptions(result.assumed, result.verdict);
   heed_other_camera(config, camera, result.verdict);
+  if (is_other_lens && knows_covariance(camera))
+    heed({.name = "covariance",
+          .state = State::care,
+          .text = "the camera's covariance is not that of the beam's calibration: errors of both count as independent"},
+         "give the camera.yaml that lies beside the beam's file", result.verdict);
   return result;
 }
 

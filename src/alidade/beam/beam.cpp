@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "alidade/beam/unit_direction.h"
+#include "alidade/geometry/covariance.h"
 
 namespace alidade {
 
@@ -18,6 +19,17 @@ Beam Beam::retract(const BeamVector& step) const {
   moved.direction_in_cam = retract_direction(direction_in_cam, step.segment<2>(3));
   moved.scale += step[5];
   return moved;
+}
+
+std::string fault(const Beam& beam) {
+  constexpr double off = 1e-6;  // of a unit vector
+  const bool is_ray = beam.origin_in_cam.allFinite() && std::abs(beam.direction_in_cam.norm() - 1.0) < off;
+  if (!is_ray || !std::isfinite(beam.scale) || beam.scale == 0.0)
+    return "a beam has a finite origin, a direction of length one and a scale other than zero";
+  if (!beam.cov.allFinite() || !beam.cov_with_lens.allFinite() ||
+      (beam.cov_with_lens.size() > 0 && beam.cov_with_lens.rows() != num_beam_params))
+    return "the beam's covariance is not finite, or not of its six parameters";
+  return is_covariance(beam.cov) ? "" : "the beam's covariance has a negative variance";
 }
 
 Eigen::Vector3d point_at(const Beam& beam, double range_m) {

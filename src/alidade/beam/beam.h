@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <string>
 
 #include "alidade/camera/camera.h"
 #include "alidade/public.h"
@@ -49,6 +50,10 @@ struct Beam {
   /// The beam moved by a small step of its six parameters; covariances stay as they are.
   [[nodiscard]] Beam retract(const BeamVector& step) const;
 };
+
+/// What is wrong with a beam: an origin or a scale that is not finite, a direction that is not of length one, a matrix
+/// that is no covariance. Empty where nothing is.
+[[nodiscard]] std::string fault(const Beam& beam);
 
 /// Point of a reading. [m]
 [[nodiscard]] Eigen::Vector3d point_at(const Beam& beam, double range_m);

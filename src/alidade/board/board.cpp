@@ -47,6 +47,7 @@ int num_points(const Board& board) { return board.cols * board.rows * (board.kin
 
 std::vector<Eigen::Vector3d> points_in_board(const Board& board) {
   std::vector<Eigen::Vector3d> points;
+  if (board.cols < 1 || board.rows < 1) return points;
   points.reserve(static_cast<std::size_t>(num_points(board)));
   for (int row = 0; row < board.rows; ++row) {
     for (int col = 0; col < board.cols; ++col) {

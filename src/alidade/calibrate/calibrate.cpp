@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/board/same_place.h"
 #include "alidade/calibrate/checks/corner_numbering.h"
 #include "alidade/calibrate/checks/lens_covariance.h"
 #include "alidade/calibrate/checks/repeated_views.h"

@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "alidade/board/same_place.h"
 #include "alidade/board_detector/board_guess.h"
-#include "alidade/calibrate/checks/repeated_views.h"
 
 namespace alidade {
 namespace {

@@ -258,6 +258,8 @@ void require_sense(const LocalizeConfig& config, const Camera& camera) {
   add_reading_faults(config, found);
   if (config.mask) add_faults(*config.mask, camera, found);
   if (!config.range_readings.empty() && !config.beam) found.emplace_back("range readings need a beam");
+  if (config.beam)
+    if (const std::string of_beam = fault(*config.beam); !of_beam.empty()) found.push_back(of_beam);
   add_lens_faults(config.filter, camera, found);
   throw_if_any(found);
 }

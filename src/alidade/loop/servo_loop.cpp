@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "alidade/estimation/config_error.h"
 #include "alidade/loop/lens_observer.h"
 #include "alidade/servo/head_servo.h"
 #include "alidade/simulate/draws.h"
@@ -272,6 +273,8 @@ ServoScene xiahou_servo_scene() {
 
 ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed,
                    const std::function<void(const ServoRow&)>& watch) {
+  if (!(scene.period_s > 0.0) || !(scene.duration_s >= 0.0 && scene.duration_s <= 1e9 * scene.period_s))
+    throw ConfigError("a servo's period is above zero, and its duration not more than 1e9 of them");
   ServoConfig own = config;
   own.axes = scene.axes;
   own.period_s = scene.period_s;

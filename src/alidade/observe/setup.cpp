@@ -112,7 +112,8 @@ void check_row(const RotationRow& row, std::size_t number, const RotationLog& la
   const auto refuse = [&](const std::string& what) {
     throw ConfigError("row " + std::to_string(number) + " of the log: " + what);
   };
-  if (!std::isfinite(row.t_s)) refuse("its time is not a finite number");
+  constexpr double largest_s = 1e12;
+  if (!(std::abs(row.t_s) <= largest_s)) refuse("its time is not a finite number within 1e12 s");
   if (row.t_s < not_before_s) refuse("time must not go back");
   if (row.px.size() != layout.num_points) {
     refuse("has " + std::to_string(row.px.size()) + " pixels, but the log has " + std::to_string(layout.num_points) +
@@ -138,6 +139,10 @@ void check_log(const RotationLog& log) {
   }
   if (!log.truth.empty() && log.truth.size() != log.rows.size())
     throw ConfigError("the log's truth is not of every row");
+  if (!std::ranges::all_of(log.truth, [](const TrueIntrinsics& one) {
+        return std::ranges::all_of(one, [](double value) { return std::isfinite(value); });
+      }))
+    throw ConfigError("the log's truth is not finite");
   if (log.num_points > 0 && log.range_point >= log.num_points) throw ConfigError("the log's range is of no point");
   for (const std::optional<double>& sigma : {log.sigma_scale, log.sigma_parallax}) {
     if (sigma && !(*sigma >= 0.0 && *sigma <= 1.0)) throw ConfigError("a σ that the log states is not within 0 to 1");

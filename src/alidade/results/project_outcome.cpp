@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/estimation/config_error.h"
 #include "alidade/imaging/image_codecs.h"
 #include "alidade/results/documents/number_columns.h"
 
@@ -178,6 +179,7 @@ void fill_point(const RigProjection& projection, JobOutcome& outcome) {
 }  // namespace
 
 JobOutcome outcome_of(const BeamProjection& projection) {
+  if (projection.readings.empty()) throw ConfigError("there are no readings");
   JobOutcome outcome;
   ResultDocument& document = outcome.document;
   document.command = "project";

@@ -8,10 +8,6 @@
 
 namespace alidade {
 
-/// For each view the number of an earlier one with the very same corners: an image given twice, under whatever name.
-/// Noise moves two images of one scene apart; counted twice, one image would halve the variance that it has.
-[[nodiscard]] std::vector<std::optional<std::size_t>> repeated_views(std::span<const BoardView> views);
-
 /// For each view the number of an earlier one that shows the board at the same place (within two pixels, corner by
 /// corner) and has the same residuals [px] but for half of their variance: frames of a board and a camera that stand
 /// still share what the optics and the corner finder do at that place. Counted as independent, n of them would divide

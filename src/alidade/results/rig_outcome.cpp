@@ -223,9 +223,10 @@ void add_lines_of_head(const Rig& rig, std::size_t h, std::vector<std::string>& 
                                      .cwiseSqrt();
   const Eigen::Vector3d &base = head.world_from_base.translation, &arm = head.tilt_to_cam_m;
   const Eigen::Vector3d arm_sigma = sigma.segment<3>(tilt_to_cam_param);
+  const Eigen::Vector3d base_sigma = 3.0 * sigma_of_base(rig, rig.cov, h);  // of coordinates in the world, as they are
   lines.push_back(fmt::format("head {}: base at ({:.1f}, {:.1f}, {:.1f}) ± ({:.2g}, {:.2g}, {:.2g}) mm   (3σ)", head.id,
-                              1e3 * base.x(), 1e3 * base.y(), 1e3 * base.z(), 1e3 * sigma[0], 1e3 * sigma[1],
-                              1e3 * sigma[2]));
+                              1e3 * base.x(), 1e3 * base.y(), 1e3 * base.z(), 1e3 * base_sigma.x(),
+                              1e3 * base_sigma.y(), 1e3 * base_sigma.z()));
   lines.push_back(fmt::format("  tilt axis {:.2f} ± {:.2g} mm before the pan axis, {:.3f} ± {:.2g}° from square to it",
                               1e3 * head.pan_to_tilt_m.z(), 1e3 * sigma[pan_to_tilt_param + 2],
                               head.axes_skew_rad / degree, sigma[axes_skew_param] / degree));
@@ -246,9 +247,14 @@ std::vector<std::string> lines_of(const RigCalibration& result) {
   add_each("no board", no_boards, lines);
   add_each("not used", not_used, lines);
   add_each("rejected", rejected, lines);
-  if (!result.repeated.empty())
+  const auto num_same = static_cast<std::size_t>(std::ranges::count_if(
+      result.repeated, [](const SkippedInput& view) { return view.reason.starts_with("is the same image"); }));
+  if (num_same < result.repeated.size())
     lines.push_back(fmt::format("averaged: {} of {} views show their board where the view before does",
-                                result.repeated.size(), result.counts.given));
+                                result.repeated.size() - num_same, result.counts.given));
+  if (num_same > 0)
+    lines.push_back(
+        fmt::format("not used: {} of {} views are the same image as another", num_same, result.counts.given));
   if (result.status != RigReport::Status::converged) return lines;
   for (std::size_t h = 0; h < result.rig.heads.size(); ++h) add_lines_of_head(result.rig, h, lines);
   for (const RigFreed& one : result.freed)

@@ -34,11 +34,9 @@ JsonValue head_sigma(const Rig& rig, const Eigen::MatrixXd& cov, std::size_t h) 
   const Head& head = rig.heads[h].head;
   const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
   const HeadVector sigma = cov.diagonal().segment<num_head_params>(at).cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Matrix3d R = head.world_from_base.rotation.toRotationMatrix();
-  const Eigen::Matrix3d in_world = R * cov.block<3, 3>(at, at) * R.transpose();
   JsonValue value;
   value["id"] = head.id;
-  value["world_from_base"]["translation_m"] = list_of(Eigen::Vector3d(in_world.diagonal().cwiseMax(0.0).cwiseSqrt()));
+  value["world_from_base"]["translation_m"] = list_of(sigma_of_base(rig, cov, h));
   value["world_from_base"]["rotation_rad"] = list_of(Eigen::Vector3d(sigma.segment<3>(base_rotation_param)));
   value["pan_to_tilt_m"] = list_of(Eigen::Vector3d(sigma.segment<3>(pan_to_tilt_param)));
   value["tilt_to_cam_m"] = list_of(Eigen::Vector3d(sigma.segment<3>(tilt_to_cam_param)));
@@ -54,6 +52,13 @@ JsonValue head_sigma(const Rig& rig, const Eigen::MatrixXd& cov, std::size_t h) 
 }
 
 }  // namespace
+
+Eigen::Vector3d sigma_of_base(const Rig& rig, const Eigen::MatrixXd& cov, std::size_t h) {
+  const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
+  const Eigen::Matrix3d R = rig.heads[h].head.world_from_base.rotation.toRotationMatrix();
+  const Eigen::Matrix3d in_world = R * cov.block<3, 3>(at, at) * R.transpose();
+  return in_world.diagonal().cwiseMax(0.0).cwiseSqrt();
+}
 
 void fill_heads(const Rig& rig, ResultDocument& document) {
   JsonValue heads = JsonValue::list(), sigmas = JsonValue::list();

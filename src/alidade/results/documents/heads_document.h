@@ -9,6 +9,9 @@
 
 namespace alidade {
 
+/// σ of the position of a head's base, along the world's axes. [m]
+[[nodiscard]] Eigen::Vector3d sigma_of_base(const Rig& rig, const Eigen::MatrixXd& cov, std::size_t h);
+
 /// Puts the heads of a rig into a result, with their σ and covariance.
 void fill_heads(const Rig& rig, ResultDocument& document);
 

@@ -54,6 +54,21 @@ class Stop {
   std::vector<BoardView> seen_;
 };
 
+/// For each view the number of an earlier one of its head that is the same image.
+std::vector<std::optional<std::size_t>> same_images(std::span<const HeadView> views) {
+  std::map<int, std::vector<std::size_t>> of_head;
+  for (std::size_t v = 0; v < views.size(); ++v) of_head[views[v].head].push_back(v);
+  std::vector<std::optional<std::size_t>> same(views.size());
+  for (const auto& [head, numbers] : of_head) {
+    std::vector<BoardView> seen;
+    for (const std::size_t v : numbers) seen.push_back(views[v].seen);
+    const auto repeats = repeated_views(seen);
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      if (repeats[i]) same[numbers[i]] = numbers[*repeats[i]];
+  }
+  return same;
+}
+
 }  // namespace
 
 AveragedStops averaged_stops(std::span<const HeadView> views) {
@@ -66,7 +81,13 @@ AveragedStops averaged_stops(std::span<const HeadView> views) {
     squares += stop.squares_within();
     freedom += stop.freedom_within();
   };
-  for (const HeadView& view : views) {
+  const auto same = same_images(views);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const HeadView& view = views[v];
+    if (same[v]) {
+      result.repeated.push_back({view.seen.photo, 0, "is the same image as " + views[*same[v]].seen.photo});
+      continue;
+    }
     const auto stop = last.find(view.head);
     if (stop != last.end() && stop->second.has(view)) {
       stop->second.add(view);

@@ -74,10 +74,26 @@ TEST(RepeatedStops, AHeadThatComesBackMakesAnotherStop) {
   const RigScene scene = scene_of(1);
   const auto views = simulate_head_views(scene, {}, 1).views;
   EXPECT_TRUE(averaged_stops(views).repeated.empty());
+  const auto again = standing(views, 1, 0.0, 2);
   auto back = views;  // after all others
-  back.insert(back.end(), views.begin(), views.end());
+  back.insert(back.end(), again.begin(), again.end());
   EXPECT_TRUE(averaged_stops(back).repeated.empty());
   EXPECT_EQ(averaged_stops(back).sigma_within_rad, 0.0);
+}
+
+TEST(RepeatedStops, AnImageThatIsGivenAgainIsNoOther) {
+  const RigScene scene = scene_of(1);
+  const auto views = simulate_head_views(scene, {}, 1).views;
+  auto twice = views;
+  for (HeadView view : views) {
+    view.seen.photo += " again";
+    twice.push_back(std::move(view));
+  }
+  const RigCalibration once = calibrated(scene, views), again = calibrated(scene, twice);
+  EXPECT_EQ(again.counts.used, once.counts.used);
+  EXPECT_EQ(again.counts.skipped.back().reason, "is the same image as " + views.back().seen.photo);
+  EXPECT_NEAR(again.sigma_relative_m / once.sigma_relative_m, 1.0, 1e-9);
+  EXPECT_EQ(again.verdict.state, once.verdict.state) << again.verdict.sentence;
 }
 
 }  // namespace

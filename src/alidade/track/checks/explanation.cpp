@@ -191,7 +191,9 @@ std::optional<Likelier> likeliest(const Observations& given, std::span<const Rig
   Likelier best = fitting.front();
   const double near = std::max(clear, of_gain * (best.ln_p - as_given));
   if (fitting.size() > 1 && fitting[1].ln_p > best.ln_p - near)
-    best.explanation = {best.explanation.what + ", or " + fitting[1].explanation.what, best.explanation.to_do};
+    best.explanation = {best.explanation.what + ", or " + fitting[1].explanation.what,
+                        best.explanation.to_do + "; or " + fitting[1].explanation.to_do +
+                            "; each gives another path: look which of them is so"};
   return best;
 }
 
@@ -221,7 +223,7 @@ std::optional<Explanation> mirrored_images(std::span<const TargetObservation> ob
                                            std::span<const RigHead> heads, const FollowConfig& config,
                                            std::span<const RigFault> faults) {
   std::vector<Hypothesis> all;
-  add_mirrors(heads, std::nullopt, all);
+  add_turned(heads, std::nullopt, all);  // tilt of heads side by side that counts downwards does what flipped images do
   for (std::size_t head = 0; head < std::min<std::size_t>(heads.size(), 4); ++head) add_mirrors(heads, head, all);
   const Observations given = some_of(observations, heads);
   auto best = likeliest(given, heads, config, all);

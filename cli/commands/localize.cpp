@@ -24,6 +24,7 @@
 #include "cli/app/live.h"
 #include "cli/app/truth_times.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/localize_epoch.h"
 #include "cli/commands/localize_live.h"
 
 namespace alidade::cli {
@@ -310,6 +311,8 @@ ExitCode run_localize(LocalizeArgs args, Run& run) {
   read_values(args);
   std::vector<TimedPose> truth;
   if (!args.truth.empty()) truth = read_tum(args.truth);
+  const std::int64_t origin_ns = args.is_images() ? origin_ns_of(args.sequence) : 0;
+  from_epoch(origin_ns, truth);
   const live::LocalizeStream stream(camera, truth);
   LiveRun live(args.live, run);
   if (live.is_on()) {
@@ -332,6 +335,7 @@ ExitCode run_localize(LocalizeArgs args, Run& run) {
   if (is_estimate(static_cast<int>(result.verdict.exit_code))) require_same_times(args.truth, result);
   JobOutcome outcome = outcome_of(result);
   note_unaligned(result, outcome);
+  to_epoch(origin_ns, result, outcome);
   add_skipped(args.skipped, outcome);
   if (seen) seen->add_to(outcome);
   return live.finish(std::move(outcome));

@@ -95,6 +95,9 @@ TEST_F(LocalizeImageFolders, ReadsTheLayoutOfEuRoC) {
   ASSERT_EQ(with_imu.code, 0) << with_imu.err;
   EXPECT_NE(with_imu.out.find("IMU"), std::string::npos);
   EXPECT_EQ(with_imu.out.find("none of the IMU's readings is of the time of the path"), std::string::npos);
+  EXPECT_TRUE(Json::parse(with_imu.out)["estimate"].contains("ate_m"));
+  const std::string trajectory = read_file(path("out/trajectory.tum"));  // with the times of data.csv
+  EXPECT_NE(trajectory.find("\n1403636579.76"), std::string::npos) << trajectory.substr(0, 120);
   write_file(path("flight/mav0/cam0/data.csv"), table);
   fs::remove(data / "0.png");
   const Outcome without = localize("flight", {});  // an image that is missing is a gap

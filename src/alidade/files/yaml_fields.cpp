@@ -36,7 +36,8 @@ int checked_size(double value, const std::string& file, const std::string& key) 
 
 std::string number_text(double value) {
   std::string text = fmt::format("{}", value);
-  if (text.find_first_of(".en") == std::string::npos) text += ".0";
+  // YAML 1.1, which PyYAML reads, knows no number with an exponent and without a point: 1e-05 would be a text.
+  if (text.find_first_of(".n") == std::string::npos) text.insert(std::min(text.find('e'), text.size()), ".0");
   return text;
 }
 

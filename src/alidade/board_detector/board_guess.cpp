@@ -1,10 +1,13 @@
 #include "alidade/board_detector/board_guess.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <compare>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 
 #include "alidade/board/dictionary.h"
 #include "alidade/board_detector/kinds/marker_board.h"
@@ -229,6 +232,34 @@ std::string changed_options(const Board& given, const Board& meant) {
   if (meant.kind == BoardKind::charuco && meant.dictionary != given.dictionary) add("--dictionary " + meant.dictionary);
   if (meant.kind == BoardKind::charuco && given.kind != BoardKind::charuco) add("--marker with its markers' side");
   return options;
+}
+
+std::optional<WrongBoard> smaller_board(std::span<const BoardView> views, const Board& given) {
+  constexpr std::size_t enough = 5;
+  if (given.kind != BoardKind::chessboard) return std::nullopt;
+  std::optional<std::pair<int, int>> grid;
+  std::size_t num = 0;
+  for (const BoardView& view : views) {
+    if (view.corners.empty()) continue;
+    int first_col = given.cols, last_col = 0, first_row = given.rows, last_row = 0;
+    for (const Corner& corner : view.corners) {
+      first_col = std::min(first_col, corner.index % given.cols);
+      last_col = std::max(last_col, corner.index % given.cols);
+      first_row = std::min(first_row, corner.index / given.cols);
+      last_row = std::max(last_row, corner.index / given.cols);
+    }
+    const std::pair seen(last_col - first_col + 1, last_row - first_row + 1);
+    const bool is_whole = static_cast<int>(view.corners.size()) == seen.first * seen.second;
+    if (!is_whole || (grid && *grid != seen)) return std::nullopt;
+    grid = seen;
+    ++num;
+  }
+  if (num < enough || *grid == std::pair(given.cols, given.rows)) return std::nullopt;
+  Board meant = given;
+  std::tie(meant.cols, meant.rows) = *grid;
+  return WrongBoard{fmt::format("no photo shows the whole board of {}×{} corners, and all {} show {}×{}", given.cols,
+                                given.rows, num, meant.cols, meant.rows),
+                    "use " + changed_options(given, meant) + " if that is the whole board"};
 }
 
 }  // namespace alidade

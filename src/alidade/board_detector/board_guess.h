@@ -36,6 +36,10 @@ struct WrongBoard {
                                                     std::span<const std::size_t> in_vain, const PhotoLoader& load_photo,
                                                     const Board& given, const Progress& progress = {});
 
+/// The same of photos that show a grid that seems to be part of the chessboard given: five or more, all of them the
+/// whole of one smaller grid, which no camera sees by chance.
+[[nodiscard]] std::optional<WrongBoard> smaller_board(std::span<const BoardView> views, const Board& given);
+
 /// The options that differ between two boards, as they are typed: "--board 7x10 --dictionary DICT_4X4_50".
 [[nodiscard]] std::string changed_options(const Board& given, const Board& meant);
 

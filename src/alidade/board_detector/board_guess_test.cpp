@@ -82,5 +82,28 @@ TEST(BoardGuess, NoneWhereThereIsNone) {
       0, [](std::size_t) { return cv::Mat(); }, plain));
 }
 
+/// Corners of the first columns of a board, as in so many photos.
+std::vector<BoardView> views_of(const Board& board, int num_cols, std::size_t num) {
+  BoardView view{"photo", {}};
+  for (int index = 0; index < num_points(board); ++index)
+    if (index % board.cols < num_cols) view.corners.push_back({.index = index});
+  return std::vector<BoardView>(num, view);
+}
+
+TEST(BoardGuess, AColumnThatNoPhotoShowsIsNone) {
+  const auto wrong = smaller_board(views_of(plain, 6, 8), plain);
+  ASSERT_TRUE(wrong);
+  EXPECT_EQ(wrong->reason, "no photo shows the whole board of 7×6 corners, and all 8 show 6×6");
+  EXPECT_EQ(wrong->to_add, "use --board 6x6 if that is the whole board");
+  EXPECT_FALSE(smaller_board(views_of(plain, 7, 8), plain));
+  EXPECT_FALSE(smaller_board(views_of(plain, 6, 4), plain));
+  auto some = views_of(plain, 6, 8);  // parts of a board of which each photo shows another
+  some[3] = views_of(plain, 5, 1).front();
+  EXPECT_FALSE(smaller_board(some, plain));
+  auto torn = views_of(plain, 6, 8);
+  torn[2].corners.erase(torn[2].corners.begin() + 9);
+  EXPECT_FALSE(smaller_board(torn, plain));
+}
+
 }  // namespace
 }  // namespace alidade

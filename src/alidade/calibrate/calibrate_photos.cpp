@@ -74,7 +74,8 @@ std::optional<WrongBoard> given_wrongly(const std::vector<std::size_t>& in_vain,
                                         const Board& given, const Progress& progress, const PhotoCalibration& result) {
   const auto found = static_cast<std::size_t>(std::count_if(
       result.views.begin(), result.views.end(), [](const BoardView& view) { return !view.corners.empty(); }));
-  return wrong_board(result.reasons, found, in_vain, load_photo, given, progress);
+  if (auto wrong = wrong_board(result.reasons, found, in_vain, load_photo, given, progress)) return wrong;
+  return smaller_board(result.views, given);
 }
 
 /// Adds the corners of the first extraction that the second lost: where the lens model fits badly, the second starts

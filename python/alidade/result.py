@@ -71,6 +71,11 @@ class Verdict:
         return f"{SYMBOLS[self.state]} {self.sentence}{after}"
 
 
+def _text(table: bytes) -> str:
+    """Of a table, in which names of files may stand that are no UTF-8."""
+    return table.decode(errors="surrogateescape")
+
+
 class Tables(abc.Mapping[str, "np.ndarray[Any, Any]"]):
     """Tables by name, structured arrays: `pandas.DataFrame(r.tables["corners"])`. Those of the document, and the CSV (and
     TUM) files beside it."""
@@ -90,7 +95,7 @@ class Tables(abc.Mapping[str, "np.ndarray[Any, Any]"]):
     def __getitem__(self, name: str) -> np.ndarray[Any, Any]:
         if name not in self._made:
             if name in self._files:
-                text = self._source.file(self._files[name]).decode()
+                text = _text(self._source.file(self._files[name]))
                 self._made[name] = of_tum(text) if self._files[name].endswith(".tum") else of_csv(text)
             elif name in self._source.tables:
                 self._made[name] = self._in_full(name, structured(self._source.table(name)))
@@ -102,7 +107,7 @@ class Tables(abc.Mapping[str, "np.ndarray[Any, Any]"]):
         """The document's table, whose numbers are rounded for the page, with those of the file of its name."""
         if name + ".csv" not in self._source.files:
             return table
-        exact = of_csv(self._source.file(name + ".csv").decode())
+        exact = of_csv(_text(self._source.file(name + ".csv")))
         rounded_by = 0.006
         shared = [column for column in exact.dtype.names or () if column in table.dtype.names and exact[column].dtype.kind == "f"]
         if len(exact) != len(table) or any(np.nanmax(abs(exact[each] - table[each]), initial=0.0) > rounded_by for each in shared):

@@ -42,6 +42,13 @@ template <int Size>
   return py::metaclass(py::reinterpret_borrow<py::object>(reinterpret_cast<PyObject*>(&PyType_Type)));
 }
 
+/// A text in which names of files may stand, which need not be UTF-8: such bytes as `errors` says, by default as
+/// os.fsdecode has them.
+[[nodiscard]] inline py::str text_of(const std::string& text, const char* errors = "surrogateescape") {
+  return py::reinterpret_steal<py::str>(
+      PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), errors));
+}
+
 [[nodiscard]] Array matrix_array(const Eigen::MatrixXd& matrix);
 
 void bind_board(py::module_& module);

@@ -50,10 +50,7 @@ std::string in_keywords(std::string text) {
 /// What is wrong with the input is a ValueError, in the one line that the command prints.
 void translate(std::exception_ptr thrown) {
   const auto wrong = [](const char* what) {
-    const std::string text = in_keywords(cli::one_line(what));
-    const auto said = py::reinterpret_steal<py::object>(
-        PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));  // names may be no UTF-8
-    PyErr_SetObject(PyExc_ValueError, said.ptr());
+    PyErr_SetObject(PyExc_ValueError, text_of(in_keywords(cli::one_line(what)), "replace").ptr());
   };
   try {
     if (thrown) std::rethrow_exception(thrown);

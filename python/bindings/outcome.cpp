@@ -34,7 +34,9 @@ py::object object_of(const JsonValue& value) {
           py::dict made;
           for (const auto& [key, member] : content) made[py::str(key)] = object_of(member);
           return made;
-        } else if constexpr (requires { content.front(); } && !std::is_same_v<Content, std::string>) {
+        } else if constexpr (std::is_same_v<Content, std::string>) {
+          return text_of(content);
+        } else if constexpr (requires { content.front(); }) {
           return array_of(content);
         } else {
           return py::cast(content);
@@ -131,7 +133,12 @@ void bind_outcome(py::module_& module) {
       .def_readonly("camera", &Outcome::camera)
       .def_property_readonly("model_covariance",
                              [](const Outcome& self) { return matrix_array(self.model_covariance); })
-      .def_property_readonly("lines", [](const Outcome& self) { return self.job.lines; })
+      .def_property_readonly("lines",
+                             [](const Outcome& self) {
+                               py::list lines;
+                               for (const std::string& line : self.job.lines) lines.append(text_of(line, "replace"));
+                               return lines;
+                             })
       .def_property_readonly("tables", [](const Outcome& self) { return names_of(self.job.document.data); })
       .def_property_readonly("grids", [](const Outcome& self) { return names_of(self.job.document.grids); })
       .def_property_readonly("files", [](const Outcome& self) { return names_of(self.job.files); })

@@ -7,6 +7,7 @@
 
 #include "alidade/files/csv.h"
 #include "alidade/files/files.h"
+#include "alidade/formats/camera_file.h"
 #include "alidade/testing/command_test.h"
 
 namespace alidade {
@@ -145,6 +146,11 @@ TEST_F(RangefinderCommand, ProjectNamesAnotherCamera) {
   // The file that the beam was refined from is of the same camera.
   EXPECT_EQ(projected(path("sim/camera.yaml"))["state"], "good");
   std::string camera = read_file(path("out/camera.yaml"));
+  // Errors of beam and lens cannot go together as they did when both were found.
+  Camera surer = read_camera(path("out/camera.yaml"));
+  surer.cov *= 0.5;
+  write_camera(path("surer.yaml"), surer);
+  EXPECT_EQ(projected(path("surer.yaml"))["state"], "care");
   const std::size_t at = camera.find("cx:");
   camera.replace(at, camera.find('\n', at) - at, "cx: 700");
   write_file(path("other.yaml"), camera);

@@ -300,7 +300,6 @@ FieldList fields_of(ProjectConfig& config) {
 /// one that is known better, or of another calibration.
 bool is_of_lens(const Beam& beam, const Camera& camera) {
   const Eigen::Index num_lens = camera.cov.rows();
-  if (beam.cov_with_lens.cols() != num_lens) return false;
   Eigen::MatrixXd joint(num_beam_params + num_lens, num_beam_params + num_lens);
   joint << beam.cov, beam.cov_with_lens, beam.cov_with_lens.transpose(), camera.cov;
   return is_covariance(joint);
@@ -315,8 +314,13 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
   require_camera(camera);
   if (config.own_camera) require_camera(*config.own_camera);
   BeamProjection result{.readings = {}, .beam = beam, .camera = camera, .assumed = {}, .counts = {}, .verdict = {}};
-  const bool is_other_lens = beam.cov_with_lens.size() > 0 && !is_of_lens(beam, camera);
-  if (is_other_lens) result.beam.cov_with_lens.resize(0, 0);
+  // A covariance with another lens' parameters is of another calibration.
+  Eigen::MatrixXd& with_lens = result.beam.cov_with_lens;
+  if (with_lens.cols() != camera.cov.cols()) with_lens.resize(0, 0);
+  for (Eigen::Index k = 0; k < with_lens.cols(); ++k)
+    if (camera.cov(k, k) == 0.0) with_lens.col(k).setZero();  // known exactly, as that file says
+  const bool is_other_lens = with_lens.size() > 0 && !is_of_lens(result.beam, camera);
+  if (is_other_lens) with_lens.resize(0, 0);
   for (const double range_m : ranges_m)
     result.readings.push_back({range_m, measured_point(result.beam, range_m, config.sigma_range_m),
                                measured_pixel(result.beam, camera, range_m, config.sigma_range_m)});
@@ -335,7 +339,7 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
        result.verdict);
   heed_assumptions(result.assumed, result.verdict);
   heed_other_camera(config, camera, result.verdict);
-  if (is_other_lens && knows_covariance(camera))
+  if (is_other_lens)
     heed({.name = "covariance",
           .state = State::care,
           .text = "the camera's covariance is not that of the beam's calibration: errors of both count as independent"},

@@ -4,6 +4,7 @@
 
 #include "alidade/localize.h"
 #include "alidade/testing/hover.h"
+#include "alidade/testing/trials.h"
 
 // σ of a pixel that nobody gave.
 
@@ -33,9 +34,9 @@ Hover noisy(double sigma_px) { return {.num_frames = 100, .num_others = 25, .sig
 TEST(FoundSigma, IsTakenWhereItIsNotTheUsual) {
   for (const double sigma_px : {0.1, 0.2, 1.0, 2.0, 4.0}) {
     double nees = 0.0;
-    constexpr int draws = 4;
-    for (std::uint64_t seed = 1; seed <= draws; ++seed) {
-      const HoverRun run = hovering(noisy(sigma_px), seed);
+    const int draws = testing::trials(2);
+    for (int seed = 1; seed <= draws; ++seed) {
+      const HoverRun run = hovering(noisy(sigma_px), static_cast<std::uint64_t>(seed));
       const Localization result = with_found_sigma(run);
       EXPECT_EQ(result.sigma_px_from, SigmaPxFrom::residuals) << sigma_px << " px, seed " << seed;
       EXPECT_NEAR(result.sigma_px, sigma_px, 0.12 * sigma_px) << seed;
@@ -53,7 +54,7 @@ TEST(FoundSigma, IsTakenWhereItIsNotTheUsual) {
 }
 
 TEST(FoundSigma, TheUsualStaysWhereNothingDeniesItOrItIsGiven) {
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const Localization usual = with_found_sigma(hovering(noisy(0.5), seed));
     EXPECT_EQ(usual.sigma_px, 0.5);
     EXPECT_EQ(usual.sigma_px_from, SigmaPxFrom::usual);
@@ -69,7 +70,7 @@ TEST(FoundSigma, TheUsualStaysWhereNothingDeniesItOrItIsGiven) {
 
 /// Errors that last are in no difference of few frames: their white part would be a third of them.
 TEST(FoundSigma, ErrorsThatLastAreNotTakenForLess) {
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     Hover scene = noisy(0.5);
     scene.lasting = 0.9;
     const Localization result = with_found_sigma(hovering(scene, seed));
@@ -81,7 +82,7 @@ TEST(FoundSigma, ErrorsThatLastAreNotTakenForLess) {
 /// A focal length that is 3 % off moves no pixel from frame to frame as noise does: it is named as with the σ given.
 TEST(FoundSigma, HidesNoWrongLens) {
   for (const double sigma_px : {0.5, 2.0})
-    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       HoverRun run = hovering(noisy(sigma_px), seed);
       Eigen::VectorXd values = params(run.camera.lens);
       values.head<2>() *= 1.03;

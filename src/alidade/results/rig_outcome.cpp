@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "alidade/files/number_list.h"
 #include "alidade/geometry/degree.h"
@@ -233,6 +234,9 @@ void add_lines_of_head(const Rig& rig, std::size_t h, std::vector<std::string>& 
   lines.push_back(fmt::format("  camera at ({:.2f}, {:.2f}, {:.2f}) ± ({:.2g}, {:.2g}, {:.2g}) mm from the tilt axis",
                               1e3 * arm.x(), 1e3 * arm.y(), 1e3 * arm.z(), 1e3 * arm_sigma.x(), 1e3 * arm_sigma.y(),
                               1e3 * arm_sigma.z()));
+  for (const auto& [axis, scale] :
+       {std::pair("pan", head.encoder.pan_scale), std::pair("tilt", head.encoder.tilt_scale)})
+    if (scale < 0.0) lines.push_back(fmt::format("  its {} counts the other way: {}_scale {:.4g}", axis, axis, scale));
 }
 
 std::vector<std::string> lines_of(const RigCalibration& result) {

@@ -304,6 +304,9 @@ Verdict verdict_of_beam(const RangefinderReport& report, std::span<const Check> 
   if (const Check* const care = find_check(checks, State::care)) {
     verdict.state = State::care;
     verdict.to_add = care->text;
+    if (care->name == "origin" || care->name == "spot")
+      verdict.to_add +=
+          ": add shots at other ranges, of boards tilted otherwise; `alidade plan rangefinder` says which";
     // What is wrong comes before what follows from it.
     for (const std::string_view cause :
          {"shots agree", "spots by distance", "bend", "incidence", "sheet", "drift", "wander", "scale", "fit",

@@ -306,7 +306,7 @@ def main():
     total, problems = collections.Counter(), []
 
     def most(usual):
-        return 4 if args.short else usual if args.most is None else args.most
+        return 2 if args.short else usual if args.most is None else args.most
 
     with tempfile.TemporaryDirectory() as made:
         folder = pathlib.Path(made)

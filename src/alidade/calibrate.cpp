@@ -96,8 +96,14 @@ void require_sense(CalibrateConfig config, const Board& board) {
 
 void require_sense(std::span<const BoardView> views, const ImageSize& size, const Board& board) {
   if (size.width_px < 1 || size.height_px < 1) throw ConfigError("the size of the images must be given");
-  for (const BoardView& view : views)
-    if (const std::string what = corners_fault(view, num_points(board)); !what.empty()) throw ConfigError(what);
+  for (const BoardView& view : views) {
+    if (const std::string what = corners_fault(view, num_points(board)); !what.empty())
+      throw ConfigError(view.photo + ": " + what);
+    for (const Corner& corner : view.corners)
+      if (!corner.cov.allFinite() || !(corner.cov(0, 0) > 0.0) || !(corner.cov.determinant() > 0.0))
+        throw ConfigError(
+            fmt::format("{}: corner {}: its covariance must be positive definite", view.photo, corner.index));
+  }
 }
 
 /// A few corners outside the images may be wrong ones.

@@ -29,11 +29,6 @@ void require_sense(std::span<const HeadView> views, const std::map<int, Camera>&
     found.push_back(view.seen.photo + ": the readings of its encoders are not finite");
     break;
   }
-  for (const HeadView& view : views) {
-    if (!found.empty() || !config.board) break;
-    if (const std::string what = corners_fault(view.seen, num_points(*config.board)); !what.empty())
-      found.push_back(what);
-  }
   if (found.empty()) found.push_back(image_fault(views, cameras));
   if (found.back().empty()) found.pop_back();
   require_none(found);

@@ -24,7 +24,7 @@ struct BoardView {
 };
 
 /// What is wrong with a view's corners, of a board of so many points: a number that it has not, a corner that appears
-/// twice, a position that is not finite, a covariance that is none. Empty where nothing is.
+/// twice, a position that is not finite. Empty where nothing is.
 [[nodiscard]] std::string corners_fault(const BoardView& view, int num_points);
 
 ALIDADE_PUBLIC_END

@@ -83,6 +83,9 @@ PreparedShot prepared(const Shot& shot, const Camera& camera, const RangefinderC
   ready.sigma_range_m = shot.sigma_range_m;
   const bool uses_spot = config.method != RangefinderMethod::plane;
   const bool uses_plane = config.method != RangefinderMethod::spot;
+  const bool uses_board = shot.board && (uses_plane || lens_is_free);
+  if (uses_board) reason = corners_fault(*shot.board, static_cast<int>(points.size()));
+  if (!reason.empty()) return ready;
   if (uses_spot && shot.spot) {
     ready.spot_ray = unproject(camera, shot.spot->px);
     if (ready.spot_ray) ready.spot_px = shot.spot->px;
@@ -99,7 +102,7 @@ PreparedShot prepared(const Shot& shot, const Camera& camera, const RangefinderC
                               ? *spot.sigma_px
                               : std::hypot(ready.min_sigma_spot_px, config.sigma_spot_px.value_or(guessed_sigma_px));
   }
-  if (shot.board && (uses_plane || lens_is_free)) {
+  if (uses_board) {
     use_board(shot, camera, config, uses_plane, points, ready, corners, reason);
   } else if (uses_plane) {
     use_plane(shot, ready);

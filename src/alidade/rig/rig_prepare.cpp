@@ -19,11 +19,9 @@ std::size_t index_of(std::vector<int>& known, int value) {
   return known.size() - 1;
 }
 
-bool is_of_board(const Work& work, const HeadView& view) {
-  const auto num = static_cast<int>(work.problem.points_in_board.size());
-  return !view.seen.corners.empty() && std::ranges::all_of(view.seen.corners, [num](const Corner& corner) {
-    return corner.index >= 0 && corner.index < num && corner.px.allFinite();
-  });
+std::string view_fault(const Work& work, const HeadView& view) {
+  if (view.seen.corners.empty()) return "no corners of the board";
+  return corners_fault(view.seen, static_cast<int>(work.problem.points_in_board.size()));
 }
 
 std::vector<std::optional<BoardPoseFit>> fitted_poses(const Work& work, std::span<const RigHead> heads) {
@@ -120,9 +118,9 @@ void index_views(Work& work, const std::map<int, Camera>& cameras) {
   Travels travels;
   for (std::size_t v = 0; v < work.given.size(); ++v) {
     const HeadView& view = work.given[v];
-    const bool has_camera = cameras.contains(view.head), has_corners = is_of_board(work, view);
-    work.usable.push_back(has_camera && has_corners);
-    if (!has_corners) work.report.views[v].reason = "no corners of the board";
+    const bool has_camera = cameras.contains(view.head);
+    work.report.views[v].reason = view_fault(work, view);
+    work.usable.push_back(has_camera && work.report.views[v].reason.empty());
     if (!has_camera) work.report.views[v].reason = "no camera of head " + std::to_string(view.head);
     const std::size_t head = has_camera ? index_of(work.ids, view.head) : 0;
     work.problem.views.push_back({&view, head, index_of(work.boards, view.board), travels.to(view)});

@@ -18,6 +18,10 @@ TEST(Board, HasAsManyPointsAsItSaysWhateverItsKind) {
   EXPECT_EQ(num_checked, 15);
 }
 
+TEST(Board, OfANegativeNumberOfColumnsHasNoPoints) {
+  EXPECT_TRUE(points_in_board({.cols = -1, .rows = 6, .square_m = 0.02}).empty());
+}
+
 TEST(Board, ChessboardPointsAreNumberedRowByRow) {
   const Board board{BoardKind::chessboard, 3, 2, 0.5, 0.0, ""};
   const std::vector<Eigen::Vector3d> expected{{0, 0, 0},   {0.5, 0, 0},   {1, 0, 0},

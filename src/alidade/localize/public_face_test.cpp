@@ -156,6 +156,10 @@ TEST(LocalizeFace, AnswersValuesThatCannotBe) {
   config.target.points = {{.id = 3}, {.id = 3}};
   EXPECT_EQ(fault_of(config), "the target's point 3 appears twice");
   config = {};
+  config.beam.emplace();
+  config.beam->direction_in_cam *= 7.0;
+  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("a direction of length one"));
+  config = {};
   config.target.patches = {{.width_px = 3, .height_px = 3, .grey = {1}}};
   EXPECT_NE(fault_of(config), "");
   config = {};

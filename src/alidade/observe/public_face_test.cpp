@@ -210,6 +210,10 @@ TEST(ObserveFace, AnswersLogsThatCannotBe) {
     spoil(log);
     EXPECT_THAT(fault_of(sized(), log), ::testing::HasSubstr(what));
   };
+  refuses("not a finite number within 1e12 s", [](RotationLog& log) { log.rows.back().t_s = 1e300; });
+  refuses("truth is not finite", [](RotationLog& log) {
+    log.truth.assign(log.rows.size(), {500.0, 500.0, 320.0, std::nan("")});
+  });
   refuses("row 3 of the log: its time", [](RotationLog& log) { log.rows[3].t_s = nan; });
   refuses("time must not go back", [](RotationLog& log) { log.rows[3].t_s = -1.0; });
   refuses("5 pixels", [](RotationLog& log) { log.rows[3].px.pop_back(); });

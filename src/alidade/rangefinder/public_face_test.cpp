@@ -106,14 +106,15 @@ TEST(RangefinderFace, AnswersWhatDoesNotGoTogether) {
 /// What the shots show is never thrown: a shot that cannot be is named, the others count.
 TEST(RangefinderFace, NamesShotsThatCannotBe) {
   const double nan = std::nan("");
-  for (int kind = 0; kind < 5; ++kind) {
+  for (int kind = 0; kind < 6; ++kind) {
     std::vector<Shot> shots = face_sample().simulated.shots;
     Shot& shot = shots[3];
     if (kind == 0) shot.range_m = nan;
     if (kind == 1) shot.spot = Spot{.px = {nan, 3.0}};
     if (kind == 2) shot.sigma_range_m = -1.0;
     if (kind == 3) shot.plane = Plane{.normal_in_cam = Eigen::Vector3d::Zero(), .d_m = nan};
-    if (kind == 4) shot.spot.reset(), shot.board->corners[0].index = 5000;
+    if (kind == 4) shot.board->corners[0].index = 5000;
+    if (kind == 5) shot.board->corners[0].index = shot.board->corners[1].index;
     const RangefinderCalibration result = rangefinder(shots, face_sample().camera, face_config());
     EXPECT_TRUE(result.verdict.ok()) << kind << result.verdict.sentence;
     EXPECT_FALSE(result.shots[3].used) << kind;

@@ -99,9 +99,11 @@ TEST(RigFace, NamesViewsThatCannotBe) {
   FaceScene face;
   face.views[2].seen.corners[0].index = 5000;
   face.views[3].head = 77;
+  face.views[4].seen.corners.push_back(face.views[4].seen.corners[0]);
   const RigCalibration result = rig(face.views, face.cameras, face_config(face));
   EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
-  for (const std::size_t v : {2U, 3U}) {
+  EXPECT_THAT(result.views[4].reason, ::testing::HasSubstr("appears twice"));
+  for (const std::size_t v : {2U, 3U, 4U}) {
     EXPECT_FALSE(result.views[v].used);
     EXPECT_NE(result.views[v].reason, "");
   }

@@ -44,6 +44,7 @@ export async function opensAndDraws({open, urlOf, documents}, name) {
     const heading = await page.locator('h1').innerText();
     assert.ok(heading.includes(document.verdict.sentence.slice(document.verdict.sentence.startsWith('Usable with care') ? 16 : 0).trim()), heading);
     assert.equal(await page.locator('header').getAttribute('data-state'), document.verdict.state);
+    assert.doesNotMatch(await page.locator('header').innerText(), /NaN|undefined|Infinity/);
     const ids = (await page.locator('main > .card').evaluateAll((cards) => cards.map((card) => card.id.replace('fig-', ''))));
     if (isRefused) assert.ok(ids.includes('refusal'), ids.join());
     else for (const id of expected[name]) assert.ok(ids.includes(id), `no figure ${id} among ${ids}`);

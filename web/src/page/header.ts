@@ -18,7 +18,7 @@ function countsOf(doc: Doc): string[] {
   const averaged = doc.skipped.filter((one) => one.reason.endsWith(': averaged with it')).length;
   const corners = doc.command === 'calibrate' ? doc.table('corners') : null;
   const rejected = corners ? corners.numbers('weight').filter((w) => w === 0).length : 0;
-  if (corners && doc.isAnswer) parts.push(`${doc.estimate('corners_used')} corners (${rejected} rejected)`);
+  if (corners && doc.isAnswer) parts.push(`${(corners.thinned?.from ?? corners.rows) - rejected} corners (${rejected} rejected)`);
   else if (corners) parts.push(`${corners.thinned?.from ?? corners.rows} corners`);
   else if (dropped !== undefined && dropped > averaged && doc.command !== 'track' && !isThinned) parts.push(`${dropped - averaged} rejected`);  // of a track some only waited for its start
   if (averaged > 0) parts.push(`${averaged} averaged with the one before`);

@@ -17,6 +17,7 @@ struct Agreement {
   std::size_t num_placed = 0;
   double sigma_px = std::numeric_limits<double>::infinity();  ///< Root mean square of the cameras'.
   double lens_sigmas = 0.0;                                   ///< By which a lens is asked to be another, most.
+  double agreeing = 0.0;  ///< Share of the seconds in which two or more watch that their path covers.
   double flatness = 1.0;  ///< The path's thickness over its length: of one in a plane, 0.
 };
 
@@ -40,6 +41,7 @@ Agreement agreement_of(const MovingTargetReport& report) {
     sum2 += camera.sigma_px * camera.sigma_px;
   }
   for (const CameraScore& lens : report.scores) agreement.lens_sigmas = std::max(agreement.lens_sigmas, lens.sigmas());
+  agreement.agreeing = report.agreeing;
   agreement.flatness = flatness_of(report.path);
   if (agreement.num_placed > 0) agreement.sigma_px = std::sqrt(sum2 / static_cast<double>(agreement.num_placed));
   return agreement;
@@ -76,6 +78,8 @@ struct Best {
   std::string words;
 
   void consider(const Agreement& other, const std::string& of) {
+    constexpr double most = 0.8;  // agreement in a few seconds alone may be chance
+    if (other.agreeing < most) return;
     if (other.num_placed < agreement.num_placed || other.num_placed < 2) return;
     if (other.num_placed == agreement.num_placed && !(other.sigma_px < agreement.sigma_px)) return;
     agreement = other;

@@ -9,6 +9,8 @@
 #include <opencv2/core/eigen.hpp>
 #include <vector>
 
+#include "alidade/matching/essential.h"
+
 namespace alidade {
 namespace {
 
@@ -17,7 +19,7 @@ constexpr std::size_t min_common = 30;
 
 struct Common {
   std::vector<double> t_s;
-  std::vector<cv::Point2d> first, second;
+  std::vector<Eigen::Vector2d> first, second;
 };
 
 /// At most so many moments at which both see the target.
@@ -41,16 +43,15 @@ double threshold(const ObservationSeries& a, const ObservationSeries& b) {
 
 /// Share of the common observations that agree with their best epipolar geometry.
 ObservationPair agreement(std::span<const ObservationSeries> series, std::size_t first, std::size_t second,
-                          double offset_s, std::size_t most, int samples) {
+                          double offset_s, std::size_t most, std::size_t max_draws) {
   ObservationPair pair{first, second, offset_s, 0.0, 0};
   const Common common = common_observations(series[first], series[second], offset_s, most);
   pair.num_common = common.t_s.size();
   if (pair.num_common < min_common) return pair;
-  cv::Mat agree;
-  const cv::Mat E = cv::findEssentialMat(common.first, common.second, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.99,
-                                         threshold(series[first], series[second]), samples, agree);
-  if (E.rows < 3 || agree.empty()) return pair;
-  pair.share = static_cast<double>(cv::countNonZero(agree)) / static_cast<double>(pair.num_common);
+  const auto found =
+      agreeing_essential(common.first, common.second, {threshold(series[first], series[second]), 0.99, max_draws});
+  if (!found) return pair;
+  pair.share = static_cast<double>(found->num_agree) / static_cast<double>(pair.num_common);
   return pair;
 }
 
@@ -106,16 +107,19 @@ std::optional<RelativePose> relative_pose(const ObservationSeries& first, const 
                                           double offset_s) {
   const Common common = common_observations(first, second, offset_s, 2000);
   if (common.t_s.size() < min_common) return std::nullopt;
-  const cv::Mat K = cv::Mat::eye(3, 3, CV_64F);
-  cv::Mat agree, R, t, points;
-  const cv::Mat E =
-      cv::findEssentialMat(common.first, common.second, K, cv::RANSAC, 0.999, threshold(first, second), 1000, agree);
-  if (E.rows != 3) return std::nullopt;
+  const auto found = agreeing_essential(common.first, common.second, {threshold(first, second), 0.999, 1000});
+  if (!found) return std::nullopt;
+  std::vector<cv::Point2d> in_first, in_second;
+  for (std::size_t i = 0; i < common.t_s.size(); ++i) {
+    in_first.emplace_back(common.first[i].x(), common.first[i].y());
+    in_second.emplace_back(common.second[i].x(), common.second[i].y());
+  }
   constexpr double furthest = 1e3;
-  const int num_agree = cv::countNonZero(agree);
-  cv::recoverPose(E, common.first, common.second, K, R, t, furthest, agree, points);
+  cv::Mat E, R, t, points, agree(found->agree, true);
+  cv::eigen2cv(found->E, E);
+  cv::recoverPose(E, in_first, in_second, cv::Mat::eye(3, 3, CV_64F), R, t, furthest, agree, points);
   // Rays that agree but meet behind a camera are of one whose images are mirrored.
-  if (2 * cv::countNonZero(agree) < num_agree) return std::nullopt;
+  if (2 * cv::countNonZero(agree) < static_cast<int>(found->num_agree)) return std::nullopt;
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
   cv::cv2eigen(R, rotation);

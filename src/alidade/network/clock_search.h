@@ -25,7 +25,7 @@ struct ObservationPair {
                                                              const Progress& progress);
 
 /// cam_from_cam(second, first), translation of length 1, and where the target was (time of the first, point in the
-/// first camera). Five-point algorithm with random samples (Nistér, 2004; OpenCV's).
+/// first camera). By agreeing_essential().
 struct RelativePose {
   Rigid3 cam_from_first;
   std::vector<double> t_s;

@@ -11,6 +11,7 @@
 #include "alidade/camera/camera_fault.h"
 #include "alidade/geometry/covariance.h"
 #include "alidade/geometry/decompositions.h"
+#include "alidade/pantilt/head_view.h"
 #include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/track/checks/track_assumed.h"
 
@@ -363,7 +364,10 @@ RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, c
   std::vector<HeadReading> seen_by;
   for (std::size_t h = 0; h < rig.heads.size(); ++h) {
     const RigHead& rig_head = rig.heads[h];
-    HeadProjection head{.id = rig_head.head.id, .pan_tilt_rad = {of_head(pans_rad, h), of_head(tilts_rad, h)}};
+    const Encoder& encoder = rig_head.head.encoder;
+    HeadProjection head{.id = rig_head.head.id,
+                        .pan_tilt_rad = {angle_near(of_head(pans_rad, h), encoder.pan_zero_rad),
+                                         angle_near(of_head(tilts_rad, h), encoder.tilt_zero_rad)}};
     head.M = projection_matrix(rig_head, head.pan_tilt_rad);
     head.cam_centre_in_world = cam_centre_in_world(rig_head.head, head.pan_tilt_rad);
     if (point_in_world)

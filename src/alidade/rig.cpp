@@ -127,6 +127,7 @@ RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cam
   result.config = config;
   result.counts.given = views.size();
   result.measured = std::move(views);
+  unwrap_readings(result.measured);
   std::optional<WrongBoard> wrong;
   if (load_photo) wrong = find_board_corners(result, cameras, load_photo, progress);
   if (config.reject_outliers) drop_wrong_corners(result, cameras);

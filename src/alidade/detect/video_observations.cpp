@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "alidade/pantilt/head_view.h"
 #include "alidade/tables/logs/angle_interpolation.h"
 #include "alidade/tables/logs/head_column.h"
 
@@ -123,7 +124,11 @@ HeadAngles read_head_angles(const std::filesystem::path& file, std::span<const R
     now.t_s = csv.number(row, t);
     if (!log.rows.empty() && !(now.t_s > log.rows.back().t_s))
       throw InputError(csv.where(row, t) + ": '" + csv.text(row, t) + "' is not after the row before it of that head");
-    now.pan_tilt_roll_rad = {angle_in_row(csv, row, pan), angle_in_row(csv, row, tilt), 0.0};
+    const Encoder& zero = heads[static_cast<std::size_t>(&log - angles.logs.data())].head.encoder;
+    const Eigen::Vector3d last_rad = log.rows.empty() ? Eigen::Vector3d(zero.pan_zero_rad, zero.tilt_zero_rad, 0.0)
+                                                      : log.rows.back().pan_tilt_roll_rad;
+    now.pan_tilt_roll_rad = {reading_after(angle_in_row(csv, row, pan), last_rad.x()),
+                             reading_after(angle_in_row(csv, row, tilt), last_rad.y()), 0.0};
     log.rows.push_back(now);
   }
   check_complete(angles, heads);

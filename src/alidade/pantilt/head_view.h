@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "alidade/board/board_view.h"
@@ -17,4 +18,17 @@ struct HeadView {
 };
 
 ALIDADE_PUBLIC_END
+
+/// The same direction within half a turn of another. An angle that is there already stays as it is, to the last digit;
+/// NaN stays NaN.
+[[nodiscard]] double angle_near(double angle_rad, double near_rad);
+
+/// What an encoder reads that may begin again after a turn, as it goes on from what it read last. A reading of more
+/// than a turn is of one that does not, or is no radian: it stays.
+[[nodiscard]] double reading_after(double reading_rad, double last_rad);
+
+/// Undoes what encoders do that begin again after a turn: of each axis of each head the readings become those of one
+/// arc, about zero. Only where they lie on both sides of the turn's end, with a far wider gap inside, and cover no more
+/// than a turn.
+void unwrap_readings(std::span<HeadView> views);
 }  // namespace alidade

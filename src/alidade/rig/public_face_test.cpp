@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <opencv2/core.hpp>
 
 #include "alidade/results/rig_outcome.h"
@@ -52,6 +53,22 @@ TEST(RigFace, IsTheWholeJob) {
   const JobOutcome outcome = outcome_of(result);
   EXPECT_EQ(outcome.document.command, "rig");
   EXPECT_EQ(outcome.files.back().name, "rig.yaml");
+}
+
+/// Readings from 0 to a turn: a scale that is not exactly one, or its σ, counted for the whole turn between neighbours.
+TEST(RigFace, ReadingsThatBeginAgainAfterATurnAreThoseOfOneArc) {
+  const FaceScene face;
+  FaceScene wrapped;
+  for (HeadView& view : wrapped.views)
+    for (double& reading : view.pan_tilt_rad)
+      if (reading < 0.0) reading += 2.0 * std::numbers::pi;
+  RigConfig config = face_config(face);
+  config.sigma_scale = 1e-3;
+  const RigCalibration result = rig(wrapped.views, face.cameras, config);
+  const RigCalibration expected = rig(face.views, face.cameras, config);
+  ASSERT_TRUE(expected.verdict.ok());
+  EXPECT_EQ(result.verdict.sentence, expected.verdict.sentence);
+  EXPECT_TRUE(result.covariance.diagonal().isApprox(expected.covariance.diagonal(), 1e-3));
 }
 
 TEST(RigFace, AnswersEveryHostileNumber) {

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "alidade/pantilt/head_view.h"
 #include "alidade/tables/logs/rotation_log_stream.h"
 
 namespace alidade {
@@ -102,7 +103,16 @@ std::optional<RotationLogEntry> RotationLogStream::next() {
       continue;
     }
     if (entry) last_ = entry;
+    if (entry) unwrap(entry->row.pan_tilt_roll_rad);
     return entry;
+  }
+}
+
+/// Encoders that begin again after a turn go on from the row before.
+void RotationLogStream::unwrap(Eigen::Vector3d& angles_rad) {
+  for (int i = 0; i < 3; ++i) {
+    angles_rad[i] = reading_after(angles_rad[i], last_angles_[i]);
+    if (std::isfinite(angles_rad[i])) last_angles_[i] = angles_rad[i];
   }
 }
 

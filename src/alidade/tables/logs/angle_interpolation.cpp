@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "alidade/geometry/so3.h"
+#include "alidade/pantilt/head_view.h"
 
 namespace alidade {
 namespace {
@@ -18,8 +18,7 @@ void unwrap(std::vector<RotationRow>& rows) {
     Eigen::Vector3d& angles = row.pan_tilt_roll_rad;
     if (!angles.allFinite()) continue;
     if (last.allFinite())
-      for (int i = 0; i < 3; ++i)
-        angles[i] -= 2.0 * std::numbers::pi * std::round((angles[i] - last[i]) / (2.0 * std::numbers::pi));
+      for (int i = 0; i < 3; ++i) angles[i] = angle_near(angles[i], last[i]);
     last = angles;
   }
 }

@@ -1,6 +1,7 @@
 #include "alidade/tables/logs/events_stream.h"
 
 #include "alidade/files/table_rows.h"
+#include "alidade/pantilt/head_view.h"
 #include "alidade/tables/logs/head_column.h"
 
 namespace alidade {
@@ -65,16 +66,23 @@ EventRows::EventRows(const Csv& layout, std::span<const RigHead> heads, bool sta
       columns_(event_columns_of(layout, stands_still)),
       newest_s_(stands_still ? heads.size() : 1, -1e300),
       first_rad_(heads.size()),
-      seen_s_(heads.size()) {}
+      seen_s_(heads.size()) {
+  for (const RigHead& head : heads)
+    last_rad_.emplace_back(head.head.encoder.pan_zero_rad, head.head.encoder.tilt_zero_rad);
+}
 
 TargetObservation EventRows::read(const Csv& csv, std::size_t row) {
-  const TargetObservation observation = read_row(csv, row, columns_, heads_, newest_s_);
+  TargetObservation observation = read_row(csv, row, columns_, heads_, newest_s_);
   constexpr std::size_t max_kept = 100'000;  // images of a head: what is older than these does not come a second time
   std::set<double>& seen_s = seen_s_[observation.head];
   if (!seen_s.insert(observation.t_capture_s).second)
     throw InputError(csv.where(row, "t_capture_s") + ": '" + csv.text(row, "t_capture_s") +
                      "' is in an earlier row of this head; an image has one target");
   if (seen_s.size() > max_kept) seen_s.erase(seen_s.begin());
+  for (int axis = 0; axis < 2; ++axis) {  // encoders that begin again after a turn
+    double& last_rad = last_rad_[observation.head][axis];
+    last_rad = observation.pan_tilt_rad[axis] = reading_after(observation.pan_tilt_rad[axis], last_rad);
+  }
   std::optional<Eigen::Vector2d>& stood_rad = first_rad_[observation.head];
   if (!stood_rad) stood_rad = observation.pan_tilt_rad;
   constexpr double still_rad = 1e-6;

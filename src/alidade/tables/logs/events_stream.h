@@ -34,7 +34,8 @@ class EventRows {
   EventColumns columns_;
   std::vector<double> newest_s_;  ///< Arrival of the newest row so far; of one clock for all heads, or one for each.
   std::vector<std::optional<Eigen::Vector2d>> first_rad_;
-  std::vector<std::set<double>> seen_s_;  ///< Newest capture times of each head.
+  std::vector<Eigen::Vector2d> last_rad_;  ///< What each head's encoders read last; at first their zeros.
+  std::vector<std::set<double>> seen_s_;   ///< Newest capture times of each head.
 };
 
 /// Events row by row as they arrive, with the checks of read_events().

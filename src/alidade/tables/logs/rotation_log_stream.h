@@ -31,12 +31,14 @@ class RotationLogStream {
 
  private:
   [[nodiscard]] std::optional<RotationLogEntry> next_checked();
+  void unwrap(Eigen::Vector3d& angles_rad);
 
   CsvStream table_;
   RotationLogOptions options_;
   RotationLogColumns columns_;
   RotationLog layout_;
   std::optional<RotationLogEntry> last_;
+  Eigen::Vector3d last_angles_ = Eigen::Vector3d::Zero();  ///< Those of the newest row that has some.
   std::vector<SkippedInput> skipped_;
 };
 

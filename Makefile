@@ -53,6 +53,8 @@ demo: build
 	@$(out)/alidade calibrate build/demo/photos/left*.jpg --board 9x6 --square 0.025 --out build/demo/result
 
 # What the tests start beside them (a browser, mpirun, INDI) is installed while they compile.
+# As cli/main.cpp has it.
+keep_freed_memory := glibc.malloc.mmap_threshold=33554432:glibc.malloc.trim_threshold=536870912:glibc.malloc.top_pad=4194304
 test:
 	@tools/setup build test-build
 	@echo "test: building the tests in $(out)"
@@ -60,7 +62,7 @@ test:
 	@tools/setup test & setup=$$!; ninja -C $(out) $(jobs) || { wait $$setup; exit 1; }; wait $$setup
 	@echo "test: running them"
 	@# Three more than there are cores: those that drive a browser, a simulated head or a broker wait most of the time.
-	@ctest --test-dir $(out) --output-on-failure --parallel $$(($$(nproc) + 3))
+	@GLIBC_TUNABLES=$(keep_freed_memory) ctest --test-dir $(out) --output-on-failure --parallel $$(($$(nproc) + 3))
 	@tools/skipped_tests $(out)
 
 bench:

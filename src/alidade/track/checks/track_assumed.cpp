@@ -251,6 +251,37 @@ Assumption times_late_alike(const TrackReport& report, double sigma_clock_s) {
               text_of(1e3 * move.step_s, 2) + " ms"};
 }
 
+/// The largest of the heads' mean spacings of rows [s].
+double row_spacing_s(std::span<const TargetObservation> observations, std::size_t num_heads) {
+  double largest_s = 0.0;
+  for (std::size_t h = 0; h < num_heads; ++h) {
+    double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s, num = 0.0;
+    for (const TargetObservation& each : observations) {
+      if (each.head != h) continue;
+      first_s = std::min(first_s, each.t_capture_s);
+      last_s = std::max(last_s, each.t_capture_s);
+      num += 1.0;
+    }
+    if (num > 1.0) largest_s = std::max(largest_s, (last_s - first_s) / (num - 1.0));
+  }
+  return largest_s;
+}
+
+/// What the commonest delay of angles does, those of the image before: one row, as no observation shows it where the
+/// heads follow the target.
+Assumption angles_late_alike(const Assumption& angles, double row_s) {
+  const double times = row_s / angles.ordinary;
+  return {.name = "angles.late_alike",
+          .value = 0.0,
+          .ordinary = row_s,
+          .moves = std::nan(""),
+          .moved =
+              "whether the angles of all heads were read when the images were taken no observations show as long "
+              "as the heads follow the target: angles of one row earlier (" +
+              text_of(1e3 * row_s, 2) + " ms) move it by " + text_of(1e3 * times * std::abs(angles.moved_by), 2) +
+              " mm (" + text_of(times * angles.moves, 2) + "σ) in " + angles.moved.substr(0, 1)};
+}
+
 }  // namespace
 
 std::vector<HeadReading> readings_at(std::span<const TargetObservation> observations, std::size_t num_heads,
@@ -318,7 +349,11 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
   if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations say
   lister.assumed.push_back(std::move(motion));
-  if (auto row = angles_before_images(observations, rig.heads, report)) lister.assumed.push_back(std::move(*row));
+  if (auto row = angles_before_images(observations, rig.heads, report)) {
+    lister.assumed.push_back(*row);
+    if (const double row_s = row_spacing_s(observations, rig.heads.size()); row_s > 0.0 && row->moves > 0.0)
+      lister.assumed.push_back(angles_late_alike(*row, row_s));
+  }
   if (auto row = times_not_tested(observations, report, given.sigma_clock_s)) lister.assumed.push_back(std::move(*row));
   if (median.step != nullptr) lister.assumed.push_back(times_late_alike(report, given.sigma_clock_s));
   if (auto row = not_tested(observations, rig, config, report)) lister.assumed.push_back(std::move(*row));

@@ -265,7 +265,9 @@ TEST_F(RigCommand, SaysWhatIsWrongWithItsInput) {
   const std::string header = "view,board,head,pan_rad,tilt_rad,corner,u,v\n";
   expect("", "views.csv");
   expect(header, "has no views");
-  expect("view,board,head,pan_deg,tilt_deg,corner,u,v\n0,0,1,10,10,0,1,1\n", "'pan_deg'; angles are radians");
+  expect("view,board,head,pan_deg,tilt_px,corner,u,v\n0,0,1,10,10,0,1,1\n", "has no column 'tilt_rad'");
+  expect("view,board,head,pan_deg,tilt_deg,corner,u,v\n0,0,1,400,10,0,1,1\n",
+         "views.csv:2: column 'pan_deg': '400' is more than a turn");
   expect("view,board,pan_rad,tilt_rad,corner,u,v\n", "has no column 'head'");
   expect("view,board,head,pan_rad,tilt_rad\n0,0,1,0,0\n", "has no column 'corner'");
   expect(header + "0,0,1,45,0,0,1,1\n", "views.csv:2: column 'pan_rad': '45' is more than a turn; angles are radians");
@@ -278,7 +280,7 @@ TEST_F(RigCommand, SaysWhatIsWrongWithItsInput) {
   expect(header + "0,0,1,0,0,3,1e300,1\n", "views.csv:2");
   expect("view,board,head,pan_rad,tilt_rad,photo\n0,0,1,0,0,none.png\n", "none.png");
   expect("view,board,head,pan_rad,tilt_rad,photo\n0,0,1,0,0,\n", "column 'photo': is empty");
-  EXPECT_EQ(num_checked, 14);
+  EXPECT_EQ(num_checked, 15);
 }
 
 TEST_F(RigCommand, WrongUsageAndBadFilesAreNamed) {

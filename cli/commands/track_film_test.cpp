@@ -68,7 +68,7 @@ TEST_F(TrackFilm, SaysWhatIsWrongWithItsInput) {
   EXPECT_THAT(fault(angles, "pattern:nowhere.png"), AllOf(HasSubstr("3 "), HasSubstr("nowhere.png")));
   EXPECT_THAT(fault("t_s,head,pan_rad,tilt_rad\n"), HasSubstr("3 "));
   EXPECT_THAT(fault("t_s,pan_rad,tilt_rad\n0,0,0\n"), AllOf(HasSubstr("3 "), HasSubstr("no column 'head'")));
-  EXPECT_THAT(fault("t_s,head,pan_deg,tilt_deg\n0,1,0,0\n"), AllOf(HasSubstr("3 "), HasSubstr("angles are radians")));
+  EXPECT_THAT(fault("t_s,head,pan_deg,tilt_px\n0,1,0,0\n"), AllOf(HasSubstr("3 "), HasSubstr("'tilt_rad'")));
   EXPECT_THAT(fault("t_s,head,pan_rad,tilt_rad\n0,1,0,0\n0,1,0,0\n"),
               AllOf(HasSubstr("3 "), HasSubstr("is not after")));
   EXPECT_THAT(fault("t_s,head,pan_rad,tilt_rad\n0,1,0,nan\n"),

@@ -260,7 +260,7 @@ TEST_F(TrackCommand, SaysWhatIsWrongWithItsInput) {
   };
   expect("", "bad.csv");
   expect(header, "has no events");
-  expect("t_capture_s,head,pan_deg,tilt_deg,u_px,v_px\n0,1,1,1,1,1\n", "angles are radians");
+  expect("t_capture_s,head,pan_px,tilt_px,u_px,v_px\n0,1,1,1,1,1\n", "has no column 'pan_rad'");
   expect("t_capture_s,head,pan_rad,tilt_rad\n0,1,1,1\n", "has no column 'u_px'");
   expect(header + "0,0.1,3,0,0,1,1\n", "bad.csv:2: column 'head': '3' is not a head of the rig (1, 2)");
   expect(header + "0.2,0.1,1,0,0,1,1\n", "arrives before its capture");

@@ -14,16 +14,15 @@ namespace alidade {
 namespace {
 
 std::string time_column(const Csv& csv) {
-  for (const char* name : {"t_s", "t_capture_s", "t"})
+  for (const char* name : {"t_s", "t_capture_s"})
     if (csv.has(name)) return name;
   throw InputError(csv.name() + ": has no column 't_s'");
 }
 
 std::string angle_column(const Csv& csv, const std::string& axis) {
-  for (const std::string& name : {axis + "_rad", axis, axis + "_rad_at_capture"})
+  for (const std::string& name : {axis + "_rad", axis + "_rad_at_capture"})
     if (csv.has(name)) return name;
-  throw InputError(csv.name() + ": has no column '" + axis + "_rad'" +
-                   (csv.has(axis + "_deg") ? "; angles are radians" : ""));
+  throw InputError(csv.name() + ": has no column '" + axis + "_rad'");
 }
 
 void check_complete(const HeadAngles& angles, std::span<const RigHead> heads) {

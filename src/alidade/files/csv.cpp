@@ -37,13 +37,6 @@ bool is_binary(char c) {
   return (code < 0x20U && c != '\n' && c != '\r' && c != '\t') || code == 0x7fU;
 }
 
-/// What stands between cells: a semicolon where the header has some and no comma, as spreadsheets of half the world
-/// write it (with a comma in their numbers).
-char separator_of(std::string_view text) {
-  const std::string_view header = text.substr(0, text.find_first_of("\r\n"));
-  return header.find(';') != std::string_view::npos && header.find(',') == std::string_view::npos ? ';' : ',';
-}
-
 /// Splits text into rows of cells: RFC 4180, with LF, CRLF or CR ends.
 class Splitter {
  public:
@@ -71,12 +64,13 @@ class Splitter {
   }
 
   std::string cell() {
-    while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t')) ++at_;
+    while (take(' ') || (separator_ != '\t' && take('\t'))) {
+    }
     if (take('"')) return quoted_cell();
     const std::size_t end = std::min(text_.find_first_of(ends(), at_), text_.size());
     std::string cell(trimmed(text_.substr(at_, end - at_)));
     at_ = end;
-    if (separator_ == ';') std::replace(cell.begin(), cell.end(), ',', '.');
+    if (separator_ != ',') std::replace(cell.begin(), cell.end(), ',', '.');
     return cell;
   }
 
@@ -86,7 +80,7 @@ class Splitter {
     while (at_ < text_.size()) {
       const char c = text_[at_++];
       if (c == '"' && !take('"')) {
-        while (take(' ') || take('\t')) {
+        while (take(' ') || (separator_ != '\t' && take('\t'))) {
         }
         if (at_ < text_.size() && text_.substr(at_, 1).find_first_of(ends()) == std::string_view::npos) {
           throw InputError(at_line(name_, line_) + "text after a closing quote");
@@ -99,7 +93,9 @@ class Splitter {
     throw InputError(at_line(name_, begin_line) + "a quote is opened and never closed");
   }
 
-  [[nodiscard]] const char* ends() const { return separator_ == ';' ? ";\r\n" : ",\r\n"; }
+  [[nodiscard]] const char* ends() const {
+    return separator_ == ';' ? ";\r\n" : separator_ == '\t' ? "\t\r\n" : ",\r\n";
+  }
 
   std::string_view text_;
   const std::string& name_;
@@ -115,20 +111,6 @@ void refuse_binary(std::string_view text, const std::string& name, std::size_t f
   if (bad == text.end()) return;
   const auto line = static_cast<std::size_t>(std::count(text.begin(), bad, '\n')) + first_line;
   throw InputError(at_line(name, line) + "is not a text file; a table of comma-separated values is needed");
-}
-
-std::map<std::string, std::size_t> columns_of(const CsvRow& header, const std::string& name) {
-  std::map<std::string, std::size_t> columns;
-  for (std::size_t i = 0; i < header.cells.size(); ++i) {
-    const std::string& column = header.cells[i];
-    if (column.empty()) {
-      throw InputError(at_line(name, header.line) + "column " + std::to_string(i + 1) + " has no name");
-    }
-    if (!columns.emplace(column, i).second) {
-      throw InputError(at_line(name, header.line) + "column " + in_quotes(column) + " appears twice in the header");
-    }
-  }
-  return columns;
 }
 
 /// The whole of `text` as a number. None if it is not one.
@@ -187,6 +169,21 @@ std::string read_line(std::istream& in, const std::string& name, std::size_t lin
     if (c == '\n' && !is_quoted) break;
   }
   return text;
+}
+
+/// Takes comments and blank lines before the header away. Returns the line of what is left, the first being 1.
+std::size_t skip_comments(std::string_view& text) {
+  std::size_t line = 1;
+  while (!text.empty()) {
+    const std::size_t end = text.find_first_of("\r\n");
+    const std::string_view first = text.substr(0, end);
+    if (!trimmed(first).empty() && !is_csv_comment(first)) break;
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end);
+    if (text.starts_with("\r\n")) text.remove_prefix(1);
+    if (!text.empty()) text.remove_prefix(1);
+    ++line;
+  }
+  return line;
 }
 
 std::size_t count_line_ends(std::string_view text) {
@@ -250,13 +247,14 @@ Csv Csv::parse(std::string_view text, const std::string& name, bool skip_bad) {
   Csv csv;
   csv.name_ = name;
   std::size_t blank_line = 0;  // none yet
-  for (Splitter splitter(text, name, separator_of(text)); std::optional<CsvRow> row = splitter.next();) {
+  const std::size_t first_line = skip_comments(text);
+  for (Splitter splitter(text, name, csv_separator(text), first_line); std::optional<CsvRow> row = splitter.next();) {
     if (is_blank(*row)) {
       if (blank_line == 0) blank_line = row->line;
       continue;
     }
     if (csv.header_.empty()) {
-      csv.columns_ = columns_of(*row, name);
+      csv.columns_ = csv_columns(*row, name);
       csv.header_ = std::move(row->cells);
       blank_line = 0;
       continue;
@@ -303,12 +301,17 @@ bool Csv::is_empty(std::size_t row, const std::string& column) const { return te
 
 const std::string& Csv::text(std::size_t row, const std::string& column) const {
   const auto found = columns_.find(column);
-  if (found != columns_.end()) return rows_.at(row)[found->second];
+  if (found != columns_.end()) return rows_.at(row)[found->second.at];
   refuse_missing(column);
 }
 
 double Csv::number(std::size_t row, const std::string& column) const {
-  return csv_number(text(row, column), {name_, lines_.at(row), column});
+  const std::string& cell = text(row, column);
+  const CsvColumn& of = columns_.at(column);
+  const CsvPlace place{name_, lines_.at(row), header_[of.at]};
+  if (of.unit == 1.0) return csv_number(cell, place);
+  const bool is_time = of.unit == 0.0 || column.ends_with("_s");
+  return is_time ? csv_time_s(cell, of.unit, place) : of.unit * csv_number(cell, place);
 }
 
 double Csv::positive(std::size_t row, const std::string& column) const {
@@ -326,7 +329,8 @@ long Csv::integer(std::size_t row, const std::string& column, long low, long hig
 }
 
 std::string Csv::where(std::size_t row, const std::string& column) const {
-  return CsvPlace{name_, lines_.at(row), column}.text();
+  const auto found = columns_.find(column);
+  return CsvPlace{name_, lines_.at(row), found == columns_.end() ? column : header_[found->second.at]}.text();
 }
 
 void Csv::set_only_row(CsvRow row) {
@@ -338,7 +342,7 @@ void Csv::set_only_row(CsvRow row) {
 CsvStream::CsvStream(std::istream& in, std::string name) : in_(in), name_(std::move(name)) {
   std::optional<CsvRow> header = next_with_content();
   if (!header) throw_empty(name_);
-  (void)columns_of(*header, name_);
+  columns_ = csv_columns(*header, name_);
   header_ = std::move(header->cells);
   header_line_ = header->line;
   blank_line_ = 0;
@@ -348,7 +352,7 @@ Csv CsvStream::empty_table() const {
   Csv csv;
   csv.name_ = name_;
   csv.header_ = header_;
-  csv.columns_ = columns_of({header_, header_line_}, name_);
+  csv.columns_ = columns_;
   return csv;
 }
 
@@ -384,8 +388,9 @@ bool CsvStream::read_rows() {
   std::string_view text = line;
   if (first == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   refuse_binary(text, name_, first);
-  if (header_.empty()) separator_ = separator_of(text);
-  for (Splitter splitter(text, name_, separator_, first); std::optional<CsvRow> row = splitter.next();)
+  const std::size_t at = header_.empty() ? first + skip_comments(text) - 1 : first;
+  if (header_.empty()) separator_ = csv_separator(text);
+  for (Splitter splitter(text, name_, separator_, at); std::optional<CsvRow> row = splitter.next();)
     rows_.push_back(std::move(*row));
   return true;
 }

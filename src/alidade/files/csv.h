@@ -37,12 +37,32 @@ struct CsvPlace {
 /// Text as a cell: quoted where it must be.
 [[nodiscard]] std::string csv_cell(const std::string& text);
 
+/// A time as seconds, of a column in seconds (unit 1), ms, µs or ns since 1970; unit 0: by how large the number is.
+[[nodiscard]] double csv_time_s(const std::string& cell, double unit_s, const CsvPlace& place);
+
 struct CsvRow {
   std::vector<std::string> cells;
   std::size_t line = 1;  ///< Where it begins.
 };
 
+/// Where a column stands, and what one of its numbers is in the unit that its name promises; 0: of a clock, by size.
+struct CsvColumn {
+  std::size_t at = 0;
+  double unit = 1.0;
+};
+
+/// The columns of a header by their names, and by what else they may be asked for: "pan_deg" is there as "pan_rad" too,
+/// "time_ns" as "t_s". Tidies the header: "# time" is "time", "pan [deg]" and "pan(deg)" are "pan_deg". Throws
+/// InputError: a column without a name, or a duplicate one.
+[[nodiscard]] std::map<std::string, CsvColumn> csv_columns(CsvRow& header, const std::string& name);
+/// A line before the header that begins with # or % and is none itself: "# recorded by …".
+[[nodiscard]] bool is_csv_comment(std::string_view line);
+/// What stands between cells, by the header: a comma; a semicolon, as spreadsheets of half the world write it (with a
+/// comma in their numbers); or a tab.
+[[nodiscard]] char csv_separator(std::string_view text);
+
 /// A CSV file as read: header names and text cells. The ONE reader of tables; every fault names file, line and column.
+/// Columns are asked for in SI units, whatever the unit in the file's header; see csv_columns().
 class Csv {
  public:
   /// Throws InputError: unreadable, empty, no header, duplicate column, a row of another length, not text. With
@@ -81,7 +101,7 @@ class Csv {
 
   std::string name_;
   std::vector<std::string> header_;
-  std::map<std::string, std::size_t> columns_;
+  std::map<std::string, CsvColumn> columns_;
   std::vector<std::vector<std::string>> rows_;
   std::vector<std::size_t> lines_;
   std::vector<SkippedInput> skipped_;
@@ -110,6 +130,7 @@ class CsvStream {
   std::string name_;
   char separator_ = ',';
   std::vector<std::string> header_;
+  std::map<std::string, CsvColumn> columns_;
   std::size_t header_line_ = 0;
   std::size_t line_ = 1, blank_line_ = 0;  ///< Of what comes next; of a blank line just passed, 0: none.
   std::deque<CsvRow> rows_;                ///< Read and not yet given.

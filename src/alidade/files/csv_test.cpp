@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+#include <sstream>
 #include <utility>
 
 #include "alidade/testing/fault.h"
@@ -89,6 +91,55 @@ TEST(Csv, AWholeNumberMayBeWrittenAsAFloatingOne) {
 TEST(Csv, NanosecondTimeStampsAreExact) {
   EXPECT_EQ(Csv::parse("t_ns\n1403636579763555584\n", "x.csv").integer(0, "t_ns", 0, 2'000'000'000'000'000'000),
             1403636579763555584);
+}
+
+TEST(Csv, ColumnsAreAskedForInSiUnitsWhateverTheirs) {
+  const Csv csv = Csv::parse("t_ms,pan[deg],tilt (deg),range [mm],roll[°]\n1500,90,-45,20,180\n", "x.csv");
+  EXPECT_EQ(csv.number(0, "t_s"), 1.5);
+  EXPECT_NEAR(csv.number(0, "pan_rad"), 0.5 * std::numbers::pi, 1e-15);
+  EXPECT_NEAR(csv.number(0, "tilt_rad"), -0.25 * std::numbers::pi, 1e-15);
+  EXPECT_NEAR(csv.number(0, "range_m"), 0.02, 1e-15);
+  EXPECT_NEAR(csv.number(0, "roll_rad"), std::numbers::pi, 1e-15);
+  EXPECT_EQ(csv.number(0, "pan_deg"), 90.0) << "the column itself";
+  EXPECT_EQ(csv.where(0, "pan_rad"), "x.csv:2: column 'pan_deg'");
+  EXPECT_FALSE(csv.has("t_deg"));
+  EXPECT_FALSE(Csv::parse("t_ms,t_ns\n", "x.csv").has("t_s")) << "which of both is meant?";
+  EXPECT_EQ(Csv::parse("t_s,t_ms\n1,5\n", "x.csv").number(0, "t_s"), 1.0);
+  const Csv azimuth = Csv::parse("azimuth_deg,elevation\n90,0.5\n", "x.csv");
+  EXPECT_NEAR(azimuth.number(0, "pan_rad"), -0.5 * std::numbers::pi, 1e-15) << "to the right";
+  EXPECT_EQ(azimuth.number(0, "tilt_rad"), 0.5);
+}
+
+TEST(Csv, TimesMayBeThoseOfAClock) {
+  EXPECT_NEAR(Csv::parse("t_ns\n1403636579763555584\n", "x.csv").number(0, "t_s"), 1403636579.763555584, 1e-6);
+  EXPECT_NEAR(Csv::parse("t_capture_ns\n1403636579763555584\n", "x.csv").number(0, "t_capture_s"), 1403636579.763555584,
+              1e-6);
+  const Csv same = Csv::parse("t_capture_ns,t_arrival_ms\n150000000,150\n", "x.csv");
+  EXPECT_EQ(same.number(0, "t_capture_s"), same.number(0, "t_arrival_s"));
+  EXPECT_EQ(Csv::parse("time\n12.5\n", "x.csv").number(0, "t_s"), 12.5);
+  EXPECT_NEAR(Csv::parse("%time,a\n1403636579763555584,1\n", "x.csv").number(0, "t_s"), 1403636579.7635556, 1e-6);
+  EXPECT_NE(fault_of([] { (void)Csv::parse("time\nnan\n", "x.csv").number(0, "t_s"); }), "");
+}
+
+TEST(Csv, TabsSeparateAndAHeaderMayBeAComment) {
+  for (const char* text : {"a\tb c\td\n1\t\t3\n", "# by hand\n# a\tb c\td\n1\t\t3\n"}) {
+    const bool is_comment = text[0] == '#';
+    const Csv csv = Csv::parse(is_comment ? "# by hand\n# a\tb\td\n1\t\t3\n" : text, "x.csv");
+    EXPECT_EQ(csv.number(0, "a"), 1.0);
+    EXPECT_EQ(csv.text(0, is_comment ? "b" : "b c"), "");
+    EXPECT_EQ(csv.number(0, "d"), 3.0);
+    EXPECT_EQ(csv.line(0), is_comment ? 3u : 2u);
+  }
+  EXPECT_EQ(Csv::parse("# made by x, y and z\n\n# on Monday\na,b\n1,2\n", "x.csv").number(0, "b"), 2.0);
+  const std::string text = "# made by x\n%time,b\n5,2\n6,nan\n";
+  std::istringstream in(text);
+  CsvStream stream(in, "x.csv");
+  EXPECT_EQ(stream.header(), (std::vector<std::string>{"time", "b"}));
+  const Csv whole = Csv::parse(text, "x.csv");
+  EXPECT_EQ(whole.header(), stream.header());
+  EXPECT_EQ(stream.next()->line, 3u);
+  EXPECT_EQ(fault_of([&] { (void)whole.number(1, "b"); }), "x.csv:4: column 'b': 'nan' is not a finite number");
+  EXPECT_EQ(Csv::parse(text, "x.csv", true).number(1, "t_s"), 6.0);
 }
 
 TEST(Csv, WrongTablesAreRefusedByLine) {

@@ -20,7 +20,7 @@ using ImuColumns = std::array<std::string, 7>;  // time, rates, forces
 const ImuColumns imu_columns{"t_s",          "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s",
                              "force_x_m_s2", "force_y_m_s2",  "force_z_m_s2"};
 /// Those of EuRoC's imu0/data.csv, times as whole nanoseconds.
-const ImuColumns euroc_columns{"#timestamp [ns]",   "w_RS_S_x [rad s^-1]", "w_RS_S_y [rad s^-1]", "w_RS_S_z [rad s^-1]",
+const ImuColumns euroc_columns{"timestamp_ns",      "w_RS_S_x [rad s^-1]", "w_RS_S_y [rad s^-1]", "w_RS_S_z [rad s^-1]",
                                "a_RS_S_x [m s^-2]", "a_RS_S_y [m s^-2]",   "a_RS_S_z [m s^-2]"};
 
 /// Nanoseconds since 1970 need more digits than a double has: the difference is taken before.
@@ -69,7 +69,7 @@ Eigen::Quaterniond imu_rotation(const detail::Fields& fields) {
 std::vector<ImuReading> read_imu(const std::filesystem::path& file, bool skip_bad, std::vector<SkippedInput>* skipped,
                                  std::int64_t origin_ns) {
   const Csv csv = Csv::read(file, skip_bad);
-  const bool is_euroc = csv.has(euroc_columns[0]);
+  const bool is_euroc = csv.has(euroc_columns[1]);
   const ImuColumns& columns = is_euroc ? euroc_columns : imu_columns;
   csv.require(columns);
   std::vector<ImuReading> readings;

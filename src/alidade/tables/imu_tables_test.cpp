@@ -85,7 +85,7 @@ TEST_F(ImuTables, ReadsTheFileOfEuRoC) {
   EXPECT_THAT(said("#timestamp [ns],w_RS_S_x [rad s^-1]\n0,1\n"), HasSubstr("w_RS_S_y [rad s^-1]"));
   std::string seconds = euroc;
   seconds.replace(seconds.find("1403636579768555520"), 19, "1403636579.76855552");
-  EXPECT_THAT(said(seconds), HasSubstr(":4: column '#timestamp [ns]'"));
+  EXPECT_THAT(said(seconds), HasSubstr(":4: column 'timestamp_ns'"));
 }
 
 TEST_F(ImuTables, MountingsAreOursOrKalibrs) {

@@ -12,15 +12,15 @@
 namespace alidade {
 ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {
   const Csv csv = Csv::read(file, skip_bad);
-  const bool is_deg = csv.has("angle_deg");
-  if (is_deg && csv.has("angle_rad")) throw InputError(csv.name() + ": has both 'angle_rad' and 'angle_deg'");
-  const std::string angle = is_deg ? "angle_deg" : "angle_rad";
+  const std::string angle = "angle_rad";
+  const auto is_there = [&csv](const char* name) { return std::ranges::count(csv.header(), name) > 0; };
+  if (is_there("angle_deg") && is_there("angle_rad"))
+    throw InputError(csv.name() + ": has both 'angle_rad' and 'angle_deg'");
   for (const std::string& name : {std::string("t_s"), std::string("command"), angle})
     if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'; needs t_s,command,angle_rad");
   ServoLogFile read;
   for_each_row(csv, skip_bad, read.skipped, [&](std::size_t row) {
-    ServoSample sample{csv.number(row, "t_s"), csv.number(row, "command"),
-                       csv.number(row, angle) * (is_deg ? degree : 1.0)};
+    ServoSample sample{csv.number(row, "t_s"), csv.number(row, "command"), csv.number(row, angle)};
     if (csv.has("command_t_s")) sample.command_t_s = csv.number(row, "command_t_s");
     if (!read.samples.empty() && !(sample.t_s > read.samples.back().t_s))
       throw InputError(csv.where(row, "t_s") + ": '" + csv.text(row, "t_s") + "' is not after the row before it");

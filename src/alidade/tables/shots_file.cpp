@@ -22,10 +22,7 @@ std::string either(const Csv& csv, const char* first, const char* second) {
 }
 
 ShotColumns shot_columns_of(const Csv& csv) {
-  if (!csv.has("range_m")) {
-    const std::string hint = csv.has("range_mm") ? "; ranges are metres" : "";
-    csv.refuse_missing("range_m", hint);
-  }
+  if (!csv.has("range_m")) csv.refuse_missing("range_m");
   const ShotColumns columns{either(csv, "u", "u_px"), either(csv, "v", "v_px"), either(csv, "d", "d_m")};
   if (columns.u.empty() != columns.v.empty())
     throw InputError(csv.name() + ": has one of 'u' and 'v', a spot needs both");

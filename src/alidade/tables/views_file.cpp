@@ -21,13 +21,7 @@ struct ViewColumns {
 };
 
 ViewColumns view_columns_of(const Csv& csv) {
-  for (const char* name : {"pan_rad", "tilt_rad"}) {
-    if (csv.has(name)) continue;
-    const std::string axis = std::string(name).substr(0, std::string(name).find('_'));
-    const bool in_degrees = csv.has(axis + "_deg");
-    csv.refuse_missing(name, in_degrees ? ", but '" + axis + "_deg'; angles are radians" : "");
-  }
-  csv.require(std::vector<std::string>{"view", "board", "head"});
+  csv.require(std::vector<std::string>{"pan_rad", "tilt_rad", "view", "board", "head"});
   ViewColumns columns{csv.has("u") ? "u" : "u_px", csv.has("v") ? "v" : "v_px", csv.has("photo")};
   if (columns.has_photo) return columns;
   for (const std::string& name : {std::string("corner"), columns.u, columns.v}) {

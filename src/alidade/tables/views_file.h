@@ -28,8 +28,8 @@ struct ViewsOptions {
 };
 
 /// Reads `view,board,head,pan_rad,tilt_rad` with `corner,u,v` (also `u_px,v_px`), one row per corner, or with `photo`,
-/// one row per view. Throws InputError: a missing column, degrees (more than a revolution, or `pan_deg`), a view whose
-/// rows differ in board, head or angles, a corner that the board does not have or a duplicate one, no rows.
+/// one row per view. Throws InputError: a missing column, degrees in a column of radians (more than a revolution), a
+/// view whose rows differ in board, head or angles, a corner that the board does not have or a duplicate one, no rows.
 [[nodiscard]] ViewsFile read_views(const std::filesystem::path& file, const ViewsOptions& options);
 /// The same of a table that was read elsewhere.
 [[nodiscard]] ViewsFile read_views(const Csv& csv, const ViewsOptions& options);

@@ -7,18 +7,17 @@
 namespace alidade {
 namespace {
 
-std::string either(const Csv& csv, const std::string& first, const std::string& second, const std::string& hint = "") {
+std::string either(const Csv& csv, const std::string& first, const std::string& second) {
   if (csv.has(first)) return first;
   if (csv.has(second)) return second;
-  csv.refuse_missing(first, hint);
+  csv.refuse_missing(first);
 }
 
 EventColumns event_columns_of(const Csv& csv, bool stands_still) {
   csv.require(std::vector<std::string>{"t_capture_s", "head"});
-  const std::string hint = csv.has("pan_deg") || csv.has("tilt_deg") ? "; angles are radians" : "";
-  const bool has_angles = !stands_still || !hint.empty() || csv.has("pan_rad") || csv.has("tilt_rad");
-  EventColumns columns{has_angles ? either(csv, "pan_rad", "pan_rad_at_capture", hint) : "",
-                       has_angles ? either(csv, "tilt_rad", "tilt_rad_at_capture", hint) : "",
+  const bool has_angles = !stands_still || csv.has("pan_rad") || csv.has("tilt_rad");
+  EventColumns columns{has_angles ? either(csv, "pan_rad", "pan_rad_at_capture") : "",
+                       has_angles ? either(csv, "tilt_rad", "tilt_rad_at_capture") : "",
                        "",
                        "",
                        csv.has("t_arrival_s"),

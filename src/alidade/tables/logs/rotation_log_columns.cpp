@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -273,18 +272,6 @@ double time_unit_s(const std::string& name) {
   return name.ends_with("_s") ? 1.0 : 0.0;
 }
 
-/// Clocks count seconds, or their thousandths since 1970, which no log in seconds reaches.
-double read_time_s(const Cells& cells) {
-  constexpr double min_ms = 1e11, min_us = 1e14, min_ns = 1e17;
-  const std::string& cell = cells.text(cells.columns.t);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  const bool is_clock = error == std::errc{} && end == cell.data() + cell.size() && value < 1e19;
-  double unit_s = cells.columns.t_unit_s;
-  if (unit_s == 0.0) unit_s = value < min_ms ? 1.0 : value < min_us ? 1e-3 : value < min_ns ? 1e-6 : 1e-9;
-  return is_clock && unit_s < 1.0 ? unit_s * value : unit_s * cells.number(cells.columns.t);
-}
-
 double read_range(const Cells& cells, std::size_t column) {
   const double range_m = cells.number(column);
   if (!(range_m > 0.0)) throw InputError(cells.fault(column) + "is not above zero");
@@ -329,7 +316,7 @@ RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotat
 RotationRow rotation_row(const CsvRow& row, const RotationLogColumns& columns, const std::string& file) {
   const Cells cells{row, columns, file};
   RotationRow read;
-  read.t_s = read_time_s(cells);
+  read.t_s = csv_time_s(cells.text(columns.t), columns.t_unit_s, cells.place(columns.t));
   read_rotation(cells, read);
   for (std::size_t i = 0; i < columns.velocity.size(); ++i)
     read.velocity_m_per_s[static_cast<Eigen::Index>(i)] = cells.number(columns.velocity[i]);

@@ -75,7 +75,16 @@ std::vector<BoardView> part_of(std::span<const BoardView> views, const std::vect
   return part;
 }
 
-/// Both parts calibrated by themselves. A few views leave the distortion to the many.
+/// A few views leave the distortion to the many, but for its first term: another camera has its own.
+CalibrateConfig for_few_views(const CalibrateConfig& config, const CalibrateReport& many) {
+  CalibrateConfig few = with_distortion_fixed(config, many);
+  if (std::ranges::find(config.fixed, "k1") != config.fixed.end()) return few;
+  std::erase(few.fixed, "k1");
+  std::erase_if(few.priors, [](const Prior& prior) { return prior.name == "k1"; });
+  return few;
+}
+
+/// Both parts calibrated by themselves.
 std::optional<Division> calibrated(const Board& board, std::span<const BoardView> views,
                                    const std::vector<bool>& is_second, const CalibrateConfig& config,
                                    const CalibrateReport& report) {
@@ -87,9 +96,8 @@ std::optional<Division> calibrated(const Board& board, std::span<const BoardView
   const ImageSize size{report.camera.width_px, report.camera.height_px};
   Division division{is_second, calibrate(board, many, size, config, report.board_points), {}};
   if (division.first.status != CalibrateReport::Status::converged) return std::nullopt;
-  division.second =
-      calibrate(board, others, size, others.size() < few ? with_distortion_fixed(config, division.first) : config,
-                report.board_points);
+  division.second = calibrate(board, others, size, others.size() < few ? for_few_views(config, division.first) : config,
+                              report.board_points);
   if (division.second.status != CalibrateReport::Status::converged) return std::nullopt;
   if (second_has_more) division.is_second.flip();
   return division;

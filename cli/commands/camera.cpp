@@ -101,6 +101,11 @@ ExitCode show(const ShowArgs& args, Run& run) {
   return run.finish(verdict);
 }
 
+std::string misfit_text(const FittedLens& fitted) {
+  if (!std::isfinite(fitted.max_px)) return "and do not see all of the image";
+  return fmt::format("{:.2g} px off at worst over the image ({:.2g} px RMS)", fitted.max_px, fitted.rms_px);
+}
+
 struct ConvertArgs {
   std::string source, destination, format = "alidade";
   bool lossy = false;
@@ -135,8 +140,12 @@ ExitCode convert(const ConvertArgs& args, Run& run) {
   Verdict verdict;
   verdict.sentence = fmt::format("{} written as {}", args.destination, args.format);
   if (!lens.empty()) {
+    const FittedLens fitted = fitted_lens(camera, format);
     verdict.state = State::care;
-    verdict.sentence += fmt::format(", without {}", fmt::join(lens, " and "));
+    verdict.sentence +=
+        fmt::format(", without {}: the other terms are fitted anew, {}", fmt::join(lens, " and "), misfit_text(fitted));
+    run.document.estimate["left_out_rms_px"] = fitted.rms_px;
+    run.document.estimate["left_out_max_px"] = fitted.max_px;
   }
   if (!other.empty()) run.say(fmt::format("the format {} cannot hold {}", args.format, fmt::join(other, " and ")));
   if (!unread.empty()) run.say(fmt::format("not carried over from {}: {}", args.source, fmt::join(unread, " and ")));
@@ -178,7 +187,7 @@ void add_convert(App& app) {
   command.add_option("--to", args->format, "Format to write")
       ->check(CLI::IsMember({"alidade", "opencv", "ros", "kalibr", "mrcal", "colmap"}))
       ->capture_default_str();
-  command.add_flag("--lossy", args->lossy, "Write even if the format cannot hold all of the lens");
+  command.add_flag("--lossy", args->lossy, "Write the nearest lens even if the format cannot hold all of it");
 }
 
 }  // namespace

@@ -107,11 +107,14 @@ TEST_F(CameraCommand, ConvertRefusesToLoseTheLensUnlessAllowed) {
   write("a.yaml", brown_camera());
   const Outcome refused = alidade({"convert", "a.yaml", "b.yaml", "--to", "kalibr"});
   EXPECT_EQ(refused.code, 3);
-  EXPECT_EQ(refused.err, "alidade: error: a.yaml: the format kalibr cannot hold k3 -0.02; --lossy writes it without\n");
+  EXPECT_EQ(refused.err,
+            "alidade: error: a.yaml: the format kalibr cannot hold k3 -0.02; --lossy writes the nearest "
+            "without\n");
   EXPECT_FALSE(exists("b.yaml"));
   const Outcome given = alidade({"convert", "a.yaml", "b.yaml", "--to", "kalibr", "--lossy"});
   EXPECT_EQ(given.code, 0);
-  EXPECT_THAT(given.out, HasSubstr("without k3 -0.02"));
+  EXPECT_THAT(given.out, HasSubstr("without k3 -0.02: the other terms are fitted anew, "));
+  EXPECT_THAT(given.out, HasSubstr("px off at worst over the image"));
   EXPECT_TRUE(exists("b.yaml"));
 }
 

@@ -169,22 +169,23 @@ std::string camera_text(const Camera& camera, CameraFormat format, bool lossy) {
   }
   const std::vector<std::string> losses = lens_losses(camera, format);
   if (!losses.empty() && !lossy) {
-    throw InputError(fmt::format("the format {} cannot hold {}; --lossy writes it without", camera_format_name(format),
-                                 fmt::join(losses, " and ")));
+    throw InputError(fmt::format("the format {} cannot hold {}; --lossy writes the nearest without",
+                                 camera_format_name(format), fmt::join(losses, " and ")));
   }
+  const Camera kept = fitted_lens(camera, format).camera;
   switch (format) {
     case CameraFormat::alidade:
-      return detail::write_alidade(camera);
+      return detail::write_alidade(kept);
     case CameraFormat::opencv:
-      return detail::write_opencv(camera);
+      return detail::write_opencv(kept);
     case CameraFormat::ros:
-      return detail::write_ros(camera);
+      return detail::write_ros(kept);
     case CameraFormat::kalibr:
-      return detail::write_kalibr(camera);
+      return detail::write_kalibr(kept);
     case CameraFormat::mrcal:
-      return detail::write_mrcal(camera);
+      return detail::write_mrcal(kept);
     case CameraFormat::colmap:
-      return detail::write_colmap(camera);
+      return detail::write_colmap(kept);
   }
   throw std::logic_error("unknown camera format");
 }

@@ -36,8 +36,17 @@ void require_central(const Camera& camera, const std::string& name);
 /// ROS), which of several it is. In words, empty for most files. Reads and throws as read_camera() does.
 [[nodiscard]] std::vector<std::string> unread_parts(const std::filesystem::path& file);
 
-/// A camera as text of a format. Throws InputError saying what would be lost, unless `lossy`; also if the format has no
-/// such lens at all.
+/// A lens, and by how much it is off over the image of another.
+struct FittedLens {
+  Camera camera;
+  double rms_px = 0.0, max_px = 0.0;  ///< Infinite where it does not see all that the other sees.
+};
+/// The lens that a format can hold and that sees most nearly what the camera sees: terms that it cannot hold are zero,
+/// all others fitted by least squares over the image. Where nothing is lost, the camera as it is.
+[[nodiscard]] FittedLens fitted_lens(const Camera& camera, CameraFormat format);
+
+/// A camera as text of a format. Throws InputError saying what would be lost, unless `lossy`: then fitted_lens(). Also
+/// throws if the format has no such lens at all.
 [[nodiscard]] std::string camera_text(const Camera& camera, CameraFormat format, bool lossy = false);
 
 /// Writes it, whole. Throws as camera_text() does, and where the file cannot be written.

@@ -93,6 +93,10 @@ void Run::say(std::string line) { lines_.push_back(std::move(line)); }
 ExitCode Run::finish(Verdict verdict) {
   document.verdict = std::move(verdict);
   for (const auto& [file, told] : told_) heed_file(file, told, document.command == "project", document.verdict);
+  for (const auto& [doubt, remedy] : doubts_) {
+    if (document.verdict.state != State::good) say(doubt + "; " + remedy);  // the verdict has another cause
+    heed({.name = "inputs", .state = State::care, .text = doubt}, remedy, document.verdict);
+  }
   settle(document);
   document.seconds.insert(document.seconds.begin(), {"total", seconds_since(start_)});
   if (options.keeps_outcome) {

@@ -58,6 +58,8 @@ class Run {
   void add_input(std::string role, const std::filesystem::path& file);
   /// The same where its bytes are at hand.
   void add_input(std::string role, std::string name, std::string_view bytes);
+  /// What is in doubt about an input, and what would tell: no answer is good then.
+  void add_doubt(std::string doubt, std::string remedy) { doubts_.emplace_back(std::move(doubt), std::move(remedy)); }
   /// Records the seconds since the last lap (or the start) under a name: "detect", "solve".
   void lap(std::string part);
   /// A file to be written into DIR by finish(). Many large ones wait on DIR's disk, not in memory.
@@ -117,7 +119,8 @@ class Run {
   std::string result_, printed_file_;
   std::filesystem::path folder_;  ///< Where the results stand: DIR, or DIR/refused.
   bool has_report_ = false;
-  std::vector<std::pair<std::string, FileVerdict>> told_;  ///< Of inputs that come from an answer that is not good.
+  std::vector<std::pair<std::string, std::string>> doubts_;  ///< And remedies.
+  std::vector<std::pair<std::string, FileVerdict>> told_;    ///< Of inputs that come from an answer that is not good.
 };
 
 }  // namespace alidade::cli

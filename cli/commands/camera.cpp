@@ -62,7 +62,7 @@ struct ShowArgs {
 };
 
 ExitCode show(const ShowArgs& args, Run& run) {
-  const Camera camera = read_camera_input(run, "camera", args.file);
+  const Camera camera = read_camera_input(run, args.file);
   const FieldOfView view = field_of_view(camera);
   const double share = seeing_share(camera);
   run.document.counts.given = run.document.counts.used = 1;
@@ -113,7 +113,7 @@ struct ConvertArgs {
 
 ExitCode convert(const ConvertArgs& args, Run& run) {
   const CameraFormat format = camera_format(args.format);
-  Camera camera = read_camera_input(run, "camera", args.source);
+  Camera camera = read_camera_input(run, args.source);
   const std::vector<std::string> unread = unread_parts(args.source);
   std::error_code ignored;
   if (std::filesystem::is_directory(args.destination, ignored)) {
@@ -168,7 +168,7 @@ void add_show(App& app) {
       .add_option(
           "file", args->file,
           "Camera of alidade, OpenCV, ROS, Kalibr, mrcal or COLMAP, of SceneLib, of Civera's initialize_cam.m or of "
-          "Heikkilä's toolbox; FILE:NAME of several")
+          "Heikkilä's toolbox; FILE:NAME of several, FILE:fisheye of four coefficients of cv::fisheye")
       ->required();
 }
 

@@ -106,7 +106,7 @@ void say_parameters(const CameraDiff& diff, Run& run) {
 }
 
 ExitCode compare(const DiffArgs& args, Run& run) {
-  const Camera a = read_camera_input(run, "camera", args.a), b = read_camera_input(run, "camera", args.b);
+  const Camera a = read_camera_input(run, args.a), b = read_camera_input(run, args.b);
   if (a.width_px != b.width_px || a.height_px != b.height_px) {
     throw InputError(fmt::format("{} is {} × {} px, but {} is {} × {} px; compare cameras of one image size", args.a,
                                  a.width_px, a.height_px, args.b, b.width_px, b.height_px));

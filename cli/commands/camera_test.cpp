@@ -118,6 +118,25 @@ TEST_F(CameraCommand, ConvertRefusesToLoseTheLensUnlessAllowed) {
   EXPECT_TRUE(exists("b.yaml"));
 }
 
+// A fisheye of cv2.fisheye was read as a brown lens without a word.
+TEST_F(CameraCommand, FourCoefficientsOfOpenCvAreAskedAbout) {
+  write_file(folder.path() / "c.yml",
+             "%YAML:1.0\n---\nimage_width: 160\nimage_height: 120\n"
+             "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 90, 0, 80, 0, 90, 60, 0, 0, "
+             "1 ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n"
+             "   data: [ 0.02, 0.01, -0.004, 0.001 ]\n");
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"show", "c.yml"}, {"convert", "c.yml", "b.yaml"}, {"diff", "c.yml", "c.yml:brown"}}) {
+    const Outcome outcome = alidade(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("k1 k2 k3 k4 of cv::fisheye")) << words[0];
+    EXPECT_THAT(outcome.out, HasSubstr("say which lens it is: c.yml:fisheye, or c.yml:brown")) << words[0];
+  }
+  const Outcome chosen = alidade({"show", "c.yml:fisheye"});
+  EXPECT_THAT(chosen.out, HasSubstr("kannala_brandt"));
+  EXPECT_THAT(chosen.out, Not(HasSubstr("say which lens")));
+}
+
 TEST_F(CameraCommand, ConvertSaysWhatOfTheFileIsNotInTheOther) {
   write_file(folder.path() / "a.cameramodel",
              "{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [90, 90, 80, 60], 'imagersize': [160, 120],\n"

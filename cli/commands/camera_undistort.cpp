@@ -82,7 +82,7 @@ void add_straight_photos(const UndistortArgs& args, const Camera& camera, PixelM
 }
 
 ExitCode undistort(const UndistortArgs& args, Run& run) {
-  const Camera camera = read_camera_input(run, "camera", args.camera);
+  const Camera camera = read_camera_input(run, args.camera);
   require_central(camera, args.camera);
   const Camera straight = undistorted_camera(camera, args.zoom);
   const std::filesystem::path& out = run.options.out;

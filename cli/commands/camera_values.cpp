@@ -11,12 +11,16 @@
 
 namespace alidade::cli {
 
-Camera read_camera_input(Run& run, const std::string& role, const std::filesystem::path& file) {
+void add_camera_input(Run& run, const std::filesystem::path& file) {
+  const std::string name = file.string();
+  run.add_input("camera", name, read_file(file_of_camera(file)));
+  if (const std::string doubt = lens_doubt(file); !doubt.empty())
+    run.add_doubt(name + ": " + doubt, "say which lens it is: " + name + ":fisheye, or " + name + ":brown");
+}
+
+Camera read_camera_input(Run& run, const std::filesystem::path& file) {
   Camera camera = read_camera(file);
-  std::error_code ignored;
-  std::string name = file.string();
-  if (!std::filesystem::exists(name, ignored)) name = name.substr(0, name.rfind(':'));  // FILE:NAME
-  run.add_input(role, file.string(), read_file(name));
+  add_camera_input(run, file);
   return camera;
 }
 

@@ -10,8 +10,10 @@
 
 namespace alidade::cli {
 
+/// Records a camera file among the inputs of the run, FILE:NAME too, and that its lens is in doubt where it is.
+void add_camera_input(Run& run, const std::filesystem::path& file);
 /// Reads a camera file and records it among the inputs of the run. "FILE:NAME" chooses one of several.
-[[nodiscard]] Camera read_camera_input(Run& run, const std::string& role, const std::filesystem::path& file);
+[[nodiscard]] Camera read_camera_input(Run& run, const std::filesystem::path& file);
 
 /// "fx 532.8 ± 1.3 px" each, ± 3σ where σ is known.
 [[nodiscard]] std::vector<std::string> camera_lines(const Camera& camera);

@@ -23,6 +23,7 @@
 #include "cli/app/app.h"
 #include "cli/app/live.h"
 #include "cli/app/truth_times.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/localize_epoch.h"
 #include "cli/commands/localize_live.h"
@@ -228,7 +229,7 @@ void read_values(LocalizeArgs& args) {
 
 void add_inputs(const LocalizeArgs& args, Run& run) {
   if (!args.is_input() && !std::filesystem::is_directory(args.sequence)) run.add_input("sequence", args.sequence);
-  run.add_input("camera", args.camera);
+  add_camera_input(run, args.camera);
   if (!args.target.empty()) run.add_input("target", args.target);
   if (!args.map.empty()) run.add_input("map", args.map);
   if (!args.start.empty()) run.add_input("start", args.start);

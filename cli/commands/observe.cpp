@@ -18,6 +18,7 @@
 #include "cli/app/live.h"
 #include "cli/app/photo_options.h"
 #include "cli/app/standard_input.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -165,7 +166,7 @@ ExitCode run_observe(ObserveArgs args, Run& run) {
   if (live.is_on() && args.log != "-") throw UsageError("--live: only for rows from standard input, observe -");
   check_config(args.config);
   if (!args.camera.empty()) {
-    run.add_input("camera", args.camera);
+    add_camera_input(run, args.camera);
     args.config.camera = read_central_camera(args.camera);
   }
   if (!args.inputs.empty()) return observe_photos(args, run);

@@ -13,6 +13,7 @@
 #include "alidade/results/project_outcome.h"
 #include "cli/app/app.h"
 #include "cli/app/option_checks.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -40,7 +41,7 @@ ExitCode project_beam(ProjectArgs args, Run& run) {
   const BeamFile file = read_beam(args.beam);
   const std::filesystem::path camera_file = args.camera.empty() ? file.camera : args.camera;
   if (camera_file.empty()) throw UsageError("the beam names no camera; say --camera FILE");
-  run.add_input("camera", camera_file);
+  add_camera_input(run, camera_file);
   const Camera camera = read_central_camera(camera_file);
   if (!file.camera.empty() && file.camera != camera_file && std::filesystem::exists(file.camera)) {
     args.config.own_camera = read_central_camera(file.camera);

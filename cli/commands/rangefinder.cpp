@@ -15,6 +15,7 @@
 #include "alidade/tables/shots_file.h"
 #include "cli/app/app.h"
 #include "cli/app/board_options.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/rangefinder_live.h"
 
@@ -79,7 +80,7 @@ FieldList fields_of(RangefinderArgs& args) {
 ExitCode by_edges(const RangefinderArgs& args, Run& run) {
   if (args.photo.empty()) throw UsageError("--method edges needs --photo");
   run.add_input("scan", args.shots);
-  run.add_input("camera", args.camera);
+  add_camera_input(run, args.camera);
   const std::vector<ScanRow> scan = read_scan(args.shots);
   const Camera camera = read_central_camera(args.camera);
   EdgesConfig config;
@@ -122,7 +123,7 @@ ExitCode by_shots(const RangefinderArgs& args, Run& run) {
   if (!args.photo.empty() || !args.initial_guess.empty())
     throw UsageError("--photo and --start are for --method edges");
   run.add_input("shots", args.shots);
-  run.add_input("camera", args.camera);
+  add_camera_input(run, args.camera);
   ShotsFile table = read_shots(args.shots, {.skip_bad = args.skip_bad});
   const Camera camera = read_central_camera(args.camera);
   const TablePhotos photos(args.shots, photo_roles(table.shots));

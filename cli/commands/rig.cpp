@@ -13,6 +13,7 @@
 #include "alidade/tables/views_file.h"
 #include "cli/app/app.h"
 #include "cli/app/board_options.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -95,7 +96,7 @@ ExitCode run_rig(const RigArgs& args, Run& run) {
   if (!args.by_moving_target && (args.moving.clock_search_s > 0.0 || args.moving.distance || !args.truth.empty()))
     throw UsageError("--clocks, --distance and --truth are for --moving-target");
   run.add_input(args.by_moving_target ? "events" : "views", args.views);
-  for (const std::filesystem::path& camera : args.cameras) run.add_input("camera", camera);
+  for (const std::filesystem::path& camera : args.cameras) add_camera_input(run, camera);
   return args.by_moving_target ? by_moving_target(args, run) : by_views(args, run);
 }
 

@@ -69,8 +69,8 @@ detail::CameraContent read_yaml(const detail::CameraText& file) {
   const auto has = [&](const char* key) { return map[key].IsDefined(); };
   if (has_cameras_of_kalibr(root)) return detail::read_kalibr(root, file);
   if (has("distortion_model")) return detail::read_ros(root, file);
-  if (has("camera_matrix") || has("cameraMatrix") || has("distortion_coefficients"))
-    return {detail::read_opencv(root, file), {}};
+  if (has("camera_matrix") || has("cameraMatrix") || has("distortion_coefficients") || (has("K") && has("D")))
+    return detail::read_opencv(root, file);
   if (has("model") || has("fx")) return {detail::read_alidade(root, file), {}};
   detail::refuse(file.name, "", unknown_file);
 }
@@ -80,7 +80,7 @@ detail::CameraContent recognise_and_read(const detail::CameraText& file) {
   if (content.empty()) detail::refuse(file.name, "", "is empty");
   if (file.text.find('\0') != std::string_view::npos)
     detail::refuse(file.name, "", "is not text; " + std::string(unknown_file));
-  if (content.starts_with("<?xml")) return {detail::read_opencv_xml(file), {}};
+  if (content.starts_with("<?xml")) return detail::read_opencv_xml(file);
   if (content.starts_with('{') && content.find("lensmodel") != std::string_view::npos) return detail::read_mrcal(file);
   if (content.starts_with("CAHV") || content.starts_with("Model = CAHV")) {
     detail::refuse(file.name, "", "a CAHVOR camera: no model of ours (pinhole, brown, kannala_brandt)");
@@ -101,15 +101,9 @@ detail::CameraContent parse_content(std::string_view text, const std::string& na
   }
 }
 
-detail::CameraContent read_content(const std::filesystem::path& file) {
-  const std::string name = file.string();
-  const std::size_t colon = name.rfind(':');
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored) && colon != std::string::npos && colon > 0 &&
-      std::filesystem::exists(name.substr(0, colon), ignored)) {
-    return parse_content(read_file(name.substr(0, colon)), name.substr(0, colon), name.substr(colon + 1));
-  }
-  return parse_content(read_file(file), name, "");
+detail::CameraContent read_content(const std::filesystem::path& named) {
+  const std::string name = named.string(), file = file_of_camera(named).string();
+  return parse_content(read_file(file), file, name.size() > file.size() ? name.substr(file.size() + 1) : "");
 }
 
 }  // namespace
@@ -121,6 +115,17 @@ Camera parse_camera(std::string_view text, const std::string& name, const std::s
 Camera read_camera(const std::filesystem::path& file) { return read_content(file).camera; }
 
 std::vector<std::string> unread_parts(const std::filesystem::path& file) { return read_content(file).unread; }
+
+std::string lens_doubt(const std::filesystem::path& file) { return read_content(file).doubt; }
+
+std::filesystem::path file_of_camera(const std::filesystem::path& named) {
+  const std::string name = named.string();
+  const std::size_t colon = name.rfind(':');
+  std::error_code ignored;
+  const bool is_pair = !std::filesystem::exists(named, ignored) && colon != std::string::npos && colon > 0 &&
+                       std::filesystem::exists(name.substr(0, colon), ignored);
+  return is_pair ? std::filesystem::path(name.substr(0, colon)) : named;
+}
 
 Camera read_central_camera(const std::filesystem::path& file) {
   const Camera camera = read_camera(file);

@@ -19,7 +19,9 @@ ALIDADE_PUBLIC_BEGIN
 enum class CameraFormat { alidade, opencv, ros, kalibr, mrcal, colmap };
 
 /// Reads a camera file of any known format, recognised by its content. Of a file with several cameras one is chosen by
-/// its name in the file: "camchain.yaml:cam1". Throws InputError, also for a lens model that is not supported.
+/// its name in the file: "camchain.yaml:cam1". A file of OpenCV with four coefficients that does not say whose they are
+/// is read as brown; "file.yml:fisheye" reads them as those of cv::fisheye, see lens_doubt(). Throws InputError, also
+/// for a lens model that is not supported.
 [[nodiscard]] Camera read_camera(const std::filesystem::path& file);
 
 /// The same where all rays must meet in one point: throws InputError for a flat_port camera.
@@ -35,6 +37,13 @@ void require_central(const Camera& camera, const std::string& name);
 /// its pose relative to others (T_cn_cnm1 of Kalibr, extrinsics of mrcal), its position in a stereo pair (R and P of
 /// ROS), which of several it is. In words, empty for most files. Reads and throws as read_camera() does.
 [[nodiscard]] std::vector<std::string> unread_parts(const std::filesystem::path& file);
+
+/// Of which lens the coefficients of a file may be as well, in words; empty where the file, or the lens chosen behind
+/// its name ("file.yml:brown"), says it. Reads and throws as read_camera() does.
+[[nodiscard]] std::string lens_doubt(const std::filesystem::path& file);
+
+/// The file of "camchain.yaml:cam1"; any other as it is.
+[[nodiscard]] std::filesystem::path file_of_camera(const std::filesystem::path& named);
 
 /// A lens, and by how much it is off over the image of another.
 struct FittedLens {

@@ -88,25 +88,46 @@ void require_no_choice(const CameraText& file) {
   if (!file.choice.empty()) refuse(file.name, "", "holds one camera without a name; leave ':" + file.choice + "' out");
 }
 
+/// Four coefficients are k1 k2 p1 p2 of cv::calibrateCamera or k1…k4 of cv::fisheye; only OpenCV's own sample says
+/// which (`fisheye_model`). Where nothing does, and no choice, they are read as the former, and `doubt` says so.
+bool is_fisheye_file(const Fields& fields, const std::vector<double>& k, const std::string& key, const CameraText& file,
+                     std::string& doubt) {
+  const bool says = fields.has("fisheye_model");
+  const bool is_open = !says && k.size() == 4 && std::ranges::any_of(k, [](double value) { return value != 0.0; });
+  if (!is_open) {
+    require_no_choice(file);
+    return says && fields.number("fisheye_model") != 0.0;
+  }
+  if (file.choice.empty()) {
+    doubt = fmt::format("the 4 numbers of {} may be k1 k2 p1 p2 (read so: brown) or k1 k2 k3 k4 of cv::fisheye", key);
+    return false;
+  }
+  if (file.choice != "brown" && file.choice != "fisheye")
+    refuse(file.name, "", fmt::format("no lens is called '{0}'; {1}:brown or {1}:fisheye", file.choice, file.name));
+  return file.choice == "fisheye";
+}
+
 }  // namespace
 
-Camera read_opencv(const YAML::Node& root, const CameraText& file) {
-  require_no_choice(file);
+CameraContent read_opencv(const YAML::Node& root, const CameraText& file) {
   const Fields fields(root, file.name);
-  const std::string matrix_key = first_of(fields, {"camera_matrix", "cameraMatrix"});
-  const std::string distortion_key = first_of(fields, {"distortion_coefficients", "distCoeffs", "dist_coeffs"});
+  const std::string matrix_key = first_of(fields, {"camera_matrix", "cameraMatrix", "K"});
+  const std::string distortion_key = first_of(fields, {"distortion_coefficients", "distCoeffs", "dist_coeffs", "D"});
   const std::vector<double> focal_centre = from_camera_matrix(fields.matrix(matrix_key), file.name, matrix_key);
-  const bool fisheye = fields.has("fisheye_model") && fields.number("fisheye_model") != 0.0;
-  Camera camera = fisheye ? fisheye_camera(focal_centre, fields.matrix(distortion_key), file.name, distortion_key)
-                          : opencv_camera(focal_centre, fields.matrix(distortion_key), file.name, distortion_key);
+  const std::vector<double> k = fields.matrix(distortion_key);
+  CameraContent read;
+  const bool fisheye = is_fisheye_file(fields, k, distortion_key, file, read.doubt);
+  Camera& camera = read.camera;
+  camera = fisheye ? fisheye_camera(focal_centre, k, file.name, distortion_key)
+                   : opencv_camera(focal_centre, k, file.name, distortion_key);
   camera.width_px = fields.size("image_width");
   camera.height_px = fields.size("image_height");
   if (fields.has("avg_reprojection_error")) camera.rms_px = std::max(0.0, fields.number("avg_reprojection_error"));
-  return camera;
+  return read;
 }
 
 /// XML is turned into the same tree by OpenCV's own reader.
-Camera read_opencv_xml(const CameraText& file) {
+CameraContent read_opencv_xml(const CameraText& file) {
   YAML::Node root(YAML::NodeType::Map);
   if (file.text.size() > (1u << 20)) refuse(file.name, "", "is larger than 1 MiB: no camera file");
   try {
@@ -114,7 +135,8 @@ Camera read_opencv_xml(const CameraText& file) {
     for (const char* key : {"image_width", "image_height", "avg_reprojection_error", "fisheye_model"}) {
       if (storage[key].isInt() || storage[key].isReal()) root[key] = number_text(storage[key].real());
     }
-    for (const char* key : {"camera_matrix", "cameraMatrix", "distortion_coefficients", "distCoeffs"}) {
+    for (const char* key :
+         {"camera_matrix", "cameraMatrix", "K", "distortion_coefficients", "distCoeffs", "dist_coeffs", "D"}) {
       if (!storage[key].isMap()) continue;
       cv::Mat values;
       storage[key].mat().convertTo(values, CV_64F);

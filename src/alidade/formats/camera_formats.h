@@ -18,17 +18,19 @@ struct CameraText {
   std::string choice;
 };
 
-/// A camera, and what its file says beside it; see unread_parts().
+/// A camera, and what its file says beside it; see unread_parts() and lens_doubt().
 struct CameraContent {
   Camera camera;
   std::vector<std::string> unread;
+  std::string doubt = {};
 };
 
 [[nodiscard]] Camera read_alidade(const YAML::Node& root, const CameraText& file);
 [[nodiscard]] std::string write_alidade(const Camera& camera);
 
-[[nodiscard]] Camera read_opencv(const YAML::Node& root, const CameraText& file);
-[[nodiscard]] Camera read_opencv_xml(const CameraText& file);
+/// The choice is the lens of a file that does not name it, "brown" or "fisheye".
+[[nodiscard]] CameraContent read_opencv(const YAML::Node& root, const CameraText& file);
+[[nodiscard]] CameraContent read_opencv_xml(const CameraText& file);
 [[nodiscard]] std::string write_opencv(const Camera& camera);
 
 [[nodiscard]] CameraContent read_ros(const YAML::Node& root, const CameraText& file);

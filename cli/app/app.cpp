@@ -6,6 +6,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <cstdio>
 #include <deque>
 #include <iostream>
@@ -42,6 +44,8 @@ struct App::State {
 
 namespace {
 
+constexpr std::uint64_t largest_seed = std::uint64_t{1} << 62U;
+
 /// What every command has.
 void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& options) {
   options.out = std::filesystem::path("alidade-out") / spec.name.substr(0, spec.name.find(' '));
@@ -58,9 +62,33 @@ void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& o
   if (!spec.draws_random_numbers) return;
   app.add_option("--seed", options.seed, "Seed of the random numbers; same seed, same result")
       ->type_name("N")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62U))
+      ->check(CLI::Range(std::uint64_t{0}, largest_seed))
       ->capture_default_str()
       ->group(group);
+}
+
+/// A command's fields, and what every command has: all of them may stand in a config file.
+FieldList with_common_fields(FieldList fields, const CommandSpec& spec, CommonOptions& options) {
+  const auto text_of_out = [&options] { return options.out.string(); };
+  const auto take_out = [&options](const std::string& text) {
+    options.out = text;
+    return std::string();
+  };
+  fields.push_back({.name = "out", .value = TextCode{take_out, text_of_out}, .help = "", .option = "--out"});
+  fields.push_back({.name = "json", .value = &options.json, .help = "", .option = "--json"});
+  fields.push_back({.name = "quiet", .value = &options.quiet, .help = "", .option = "--quiet"});
+  fields.push_back({.name = "no_report", .value = &options.no_report, .help = "", .option = "--no-report"});
+  fields.push_back(
+      {.name = "threads", .value = &options.threads, .help = "", .limits = {0, 1024}, .option = "--threads"});
+  if (!spec.draws_random_numbers) return fields;
+  const auto take_seed = [&options](const std::string& text) -> std::string {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), options.seed);
+    const bool is_seed = error == std::errc{} && end == text.data() + text.size() && options.seed <= largest_seed;
+    return is_seed ? "" : "'" + text + "' is not a whole number from 0 to " + std::to_string(largest_seed);
+  };
+  const auto text_of_seed = [&options] { return std::to_string(options.seed); };
+  fields.push_back({.name = "seed", .value = TextCode{take_seed, text_of_seed}, .help = "", .option = "--seed"});
+  return fields;
 }
 
 /// Finds out before the work, not after it, that the results cannot be written; leaves nothing there.
@@ -198,7 +226,7 @@ JobOutcome App::run_job(const std::vector<std::string>& words, const Progress& p
   }
   Command& command = *chosen_command();
   CommonOptions& options = command.options;
-  take_config(*command.app, command.fields, command.config);
+  take_config(*command.app, with_common_fields(command.fields, command.spec, command.options), command.config);
   options.leaves_results = false;
   options.keeps_outcome = options.quiet = true;
   std::optional<tbb::global_control> limit;  // the program's own use of libraries stays as it is
@@ -226,7 +254,7 @@ int App::dispatch(int argc, const char* const* argv) {
   for (const std::string_view word : std::vector<std::string_view>(argv + 1, argv + argc))
     if (lacks_a_number(word)) throw UsageError(fmt::format("{}: '{}' lacks a number", command.spec.name, word));
   CommonOptions& options = command.options;
-  take_config(*command.app, command.fields, command.config);
+  take_config(*command.app, with_common_fields(command.fields, command.spec, command.options), command.config);
   if (command.app->count("--out") > 0) options.leaves_results = true;
   catch_interrupts();
   require_place(options);

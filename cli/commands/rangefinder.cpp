@@ -163,7 +163,6 @@ ExitCode run_rangefinder(RangefinderArgs args, Run& run) {
     require_board(args.board);
     args.config.board = args.board;
   }
-  args.config.rates_next_shots = !run.options.no_report;
   if (args.guided.live.is_on) return by_guided_shots(args, run);
   require_no_guided_shots(args.guided);
   if (args.shots.empty()) throw UsageError("give a table of shots, or --live");

@@ -51,6 +51,16 @@ void expect_near_truth(const Json& document, double sigmas = 3.5) {
   }
 }
 
+/// The page is another way to read the result; without it the result was another.
+TEST_F(RangefinderCommand, TheResultIsTheSameWithoutThePage) {
+  simulate();
+  const Json with = Json::parse(calibrate({"--json"}).out),
+             without = Json::parse(calibrate({"--json", "--no-report"}).out);
+  EXPECT_TRUE(without["grids"].contains("next_shot"));
+  EXPECT_EQ(with["grids"], without["grids"]);
+  EXPECT_EQ(with["estimate"], without["estimate"]);
+}
+
 TEST_F(RangefinderCommand, GivesTheBeamWithTheNamesOfTheContract) {
   simulate();
   for (const std::string method : {"joint", "spot", "plane"}) {
@@ -320,7 +330,7 @@ TEST_F(RangefinderCommand, SaysWhatIsWrongWithItsInput) {
   };
   expect("", "shots.csv");
   expect("range_m,u,v\n", "has no shots");
-  expect("range_mm,u,v\n2310,1,1\n", "has no column 'range_m'; ranges are metres");
+  expect("range_px,u,v\n2310,1,1\n", "has no column 'range_m'");
   expect("range_m\n2.31\n", "ranges alone");
   expect("range_m,u\n2.31,4\n", "'u' and 'v'");
   expect("range_m,nx,ny,nz\n2.31,0,0,1\n", "'nx', 'ny', 'nz' and 'd'");

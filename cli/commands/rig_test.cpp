@@ -126,6 +126,14 @@ TEST_F(RigCommand, OptionsMayStandInAFile) {
   const Json from_file = Json::parse(with_file({"--sigma-px", "0.2"}).out);
   EXPECT_EQ(from_file["estimate"], typed["estimate"]);
   EXPECT_NE(Json::parse(with_file({}).out)["estimate"], typed["estimate"]);
+  write_file(path("rig.yaml"),
+             "board: 9x6\nsquare_m: 0.025\nno-report: true\nquiet: true\nthreads: 1\nout: " + path("elsewhere") + "\n");
+  const Outcome common =
+      alidade({"rig", path("sim/views.csv"), "--camera", path("sim/camera_1.yaml"), "--config", path("rig.yaml")}, {});
+  EXPECT_EQ(common.code, 0) << common.err;
+  EXPECT_EQ(common.out, "") << "quiet";
+  EXPECT_TRUE(std::filesystem::exists(path("elsewhere/result.json")));
+  EXPECT_FALSE(std::filesystem::exists(path("elsewhere/report.html")));
   write_file(path("rig.yaml"), "board: 9x6\nsquare_m: 0.025\nestimate: [auto, scale]\n");
   EXPECT_THAT(with_file({}).err, ::testing::HasSubstr("'auto' excludes the others"));
   EXPECT_EQ(calibrate(path("sim/views.csv"), {"--clocks", "3"}).code, 2);

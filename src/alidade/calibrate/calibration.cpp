@@ -13,6 +13,7 @@
 #include "alidade/calibrate/checks/assumed.h"
 #include "alidade/calibrate/checks/better_model.h"
 #include "alidade/calibrate/checks/calibration_verdict.h"
+#include "alidade/calibrate/checks/corner_numbering.h"
 #include "alidade/calibrate/checks/judge.h"
 #include "alidade/calibrate/checks/model_errors.h"
 #include "alidade/calibrate/checks/view_scores.h"
@@ -208,8 +209,10 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
     result.verdict = refusal_verdict(result);
     return result;
   }
+  reject_flipped_photos(board, result.size, result.config, result.board_views, result);
   const std::vector<ShapeTransfer> transfers = settle_shape(result, progress);
   const ModelErrors errors = settle_model(result);
+  name_flipped_photos(board, result.board_views, result);
   result.counts = count_photos(result);
   const std::vector<ViewScore> scores = view_scores(board, result.config, result.board_views, result);
   result.assumed = count_assumptions(board, result.config, result.board_views, scores, air, result);

@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "alidade/calibrate.h"
+#include "alidade/calibrate/checks/corner_numbering.h"
 #include "alidade/estimation/median.h"
 
 namespace alidade {
 namespace {
 
 /// Whether a view's corners are the calibration's outliers, all of them: most of them fit no board.
-bool is_misfit(const ViewFit& fit) { return !fit.used && fit.reason.ends_with("do not fit the other photos"); }
+bool is_misfit(const ViewFit& fit) { return !fit.used && is_misfit_reason(fit.reason); }
 
 /// What is found, less the outliers, with the covariance to be stated.
 void state_corners(bool drop, FoundCorners& found) {

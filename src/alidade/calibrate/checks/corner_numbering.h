@@ -6,6 +6,7 @@
 
 #include "alidade/board/board.h"
 #include "alidade/board/board_view.h"
+#include "alidade/calibrate/calibrate.h"
 
 namespace alidade {
 
@@ -20,5 +21,17 @@ namespace alidade {
 /// number, in the board frame.
 [[nodiscard]] std::vector<std::string> numbering_faults(const Board& board, std::span<const BoardView> views,
                                                         std::span<const Eigen::Vector3d> board_points);
+
+/// Whether a view was rejected as its corners do not fit the other photos.
+[[nodiscard]] bool is_misfit_reason(const std::string& reason);
+
+/// Rejects views in use whose corners fit the lens of all others only once the image is mirrored, or rotated by half a
+/// turn, by name; solved without them.
+void reject_flipped_photos(const Board& board, ImageSize size, const CalibrateConfig& config,
+                           std::vector<BoardView>& views, CalibrateReport& report);
+
+/// Says in the reason of such a view where its corners fit once the image is mirrored, or rotated by half a turn: a
+/// rotated image puts the centre and p1, p2 on the other side, a mirrored one exchanges left and right as well.
+void name_flipped_photos(const Board& board, std::span<const BoardView> views, CalibrateReport& report);
 
 }  // namespace alidade

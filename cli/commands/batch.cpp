@@ -208,12 +208,15 @@ void add_batch(App& app) {
   CLI::App& command = app.add_command(
       {.name = "batch",
        .summary = "Many commands, one per row: one table of their results, and the outliers of the lot",
-       .examples = "  alidade batch jobs.csv --out lot\n"
-                   "  alidade batch jobs.csv --out lot --resume\n"
-                   "  mpirun -n 8 alidade batch jobs.csv --out lot && alidade batch jobs.csv --out lot --resume\n\n"
-                   "jobs.csv, one row per command; other columns are options by their names:\n"
-                   "  camera,arguments,square\n"
-                   "  c0001,calibrate photos/c0001 --board 9x6,0.025"},
+       .examples =
+           "  alidade batch jobs.csv --out lot\n"
+           "  alidade batch jobs.csv --out lot --resume\n"
+           "  mpirun -n 8 alidade batch jobs.csv --out lot && alidade batch jobs.csv --out lot --resume\n\n"
+           "jobs.csv, one row per command; other columns are options by their names:\n"
+           "  camera,arguments,square\n"
+           "  c0001,calibrate photos/c0001 --board 9x6,0.025\n\n"
+           "Exit code: 0 where a row has an estimate, 4 where none has, whatever the others say; each row's own is in\n"
+           "batch.csv, column exit_code, and those without an estimate are named"},
       [args](Run& run) { return run_batch(*args, run); });
   command.add_option("jobs", args->jobs, "CSV: arguments; camera, command, options by name")
       ->required()

@@ -106,4 +106,17 @@ std::string lens_changes(const Localization& report) {
   return text + as_water_text(report);
 }
 
+void add_hidden(const Localization& report, Verdict& verdict) {
+  const auto focal = std::ranges::find(report.given, "focal length", &GivenNumber::name);
+  if (focal == report.given.end() || !(focal->sigma_hidden > 0.0)) return;
+  constexpr double worth_a_word = 1.1;
+  const double enlarged = std::hypot(1.0, focal->moves * focal->sigma_hidden);
+  if (enlarged < worth_a_word) return;
+  verdict.checks.push_back({"focal length", State::good,
+                            "the observations would not show another focal length, by up to " +
+                                text_of(100.0 * focal->hidden, 2) + " %: σ is enlarged up to " + text_of(enlarged, 2) +
+                                " times for it",
+                            100.0 * focal->hidden, 0.0, "%", "path"});
+}
+
 }  // namespace alidade

@@ -84,6 +84,10 @@ std::vector<Assumption> localize_assumed(const Localization& report) {
     each.ordinary = named->ordinary;
     const double error = each.sigma.value_or(named->ordinary);
     each.moves = given.moves * error;
+    if (each.sigma && given.sigma_hidden > 0.0) {
+      each.sigma = std::hypot(error, given.sigma_hidden);
+      each.moves = given.moves * *each.sigma / std::hypot(1.0, given.moves * given.sigma_hidden);
+    }
     each.moved = std::string(given.moved);
     each.moved_by = given.moved_by * error;
     each.remedy = is_scale   ? "give --sigma-scale, or σ in --target: sigma_m of each point, sigma_square_m of a board"

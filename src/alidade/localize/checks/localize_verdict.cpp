@@ -309,7 +309,7 @@ void add_restarts(const Localization& report, Verdict& verdict) {
 void add_checks(const Localization& report, Verdict& verdict) {
   for (const auto add :
        {add_innovations, add_losses, add_missing, add_frame, add_map, add_masks, add_restarts, add_sensors, add_imu,
-        add_given, add_radial, add_residuals, add_filter_alone, add_tilt, add_side, add_truth})
+        add_given, add_hidden, add_radial, add_residuals, add_filter_alone, add_tilt, add_side, add_truth})
     add(report, verdict);
 }
 

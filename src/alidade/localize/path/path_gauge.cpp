@@ -83,7 +83,9 @@ void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& co
   for (std::size_t i = 0; i < state_.points.size(); ++i) {
     if (!lives_[i]) continue;
     const Eigen::MatrixXd z = Z.points[i] + spread.point_J[i] * considered * given;
-    spread.point_cov[i] = aligned_cov(gauge, of_sums, spread.point_cov[i], z, gauge.moves(state_.points[i]));
+    const Eigen::MatrixXd moves = gauge.moves(state_.points[i]);
+    spread.point_cov[i] = aligned_cov(gauge, of_sums, spread.point_cov[i], z, moves);
+    spread.point_J[i] -= moves * moved_by_given;
   }
 }
 

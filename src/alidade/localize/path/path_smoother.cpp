@@ -233,6 +233,7 @@ SmoothedPath PathSmoother::finished(const SmootherSystem& system) {
   path.num_dropped = problem_.observations.size() - observations_.size();
   if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.given_in_world.has_value(); }))
     widen(system.cost, path);
+  count_hidden(path);
   return path;
 }
 
@@ -330,6 +331,7 @@ SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
   const std::vector<int> given(lens_order_.begin() + num_estimated_, lens_order_.end());
   path.given = given_numbers(
       {problem_.camera, given, considered, asked.score, asked.information, asked.information, spread.J, path.cov});
+  fill_hidden(spread, path);
   add_clock(path);
   return path;
 }

@@ -98,6 +98,8 @@ class PathSmoother {
   [[nodiscard]] bool asks_for_lens(const SmootherSystem& system) const;
   void free_lens();
   void estimate_lens(std::vector<int> estimated);
+  void fill_hidden(const PoseChain::Spread& spread, SmoothedPath& path) const;
+  void count_hidden(SmoothedPath& path) const;
   void add_range(const SmootherState& state, std::size_t point, SmootherSystem& system) const;
   struct Speeds {
     Eigen::Vector<double, 6> values;

@@ -144,6 +144,15 @@ struct MovedPoints {
   bool is_left_out = true;              ///< The path is by the others alone.
 };
 
+/// Of the points of a target, where their own σ leaves little of a part's mean: those that are elsewhere than given
+/// against the others.
+struct MovedPart {
+  std::size_t num = 0, num_given = 0;  ///< Of so many that are in the map; 0: too few to say.
+  double shift_m = 0.0, chi2 = 0.0;    ///< Of the shift, of three numbers, that explains most.
+  double spread = 0.0;                 ///< Of all, along one direction, squares over σ²: 1 where right,
+  double spread_limit = 1e9;           ///< and 99.9 % of that.
+};
+
 /// How far an estimated path is from the true one. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM
 /// Systems", IROS 2012: ATE is the RMS distance of positions after alignment; RPE the RMS translation of
 /// (Q_i⁻¹ Q_i+1)⁻¹ (P_i⁻¹ P_i+1) between neighbours, with the aligned scale.
@@ -197,6 +206,7 @@ struct Localization {
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
   /// How far the target's points have gone in the map from their given positions: squares over σ², per number.
   double known_shift = std::numeric_limits<double>::quiet_NaN();
+  MovedPart moved_part;       ///< Of a table's target.
   RadialStructure radial;     ///< Of the residuals after the update: shows a wrong lens.
   std::size_t num_alike = 1;  ///< Candidates for the target in one image, where initialisation failed because of them.
   Camera camera;              ///< As it is at the end.

@@ -1,5 +1,6 @@
 #include "alidade/localize/checks/summary.h"
 #include "alidade/localize/frames/still_frames.h"
+#include "alidade/localize/map/moved_part.h"
 #include "alidade/localize/observation_localizer.h"
 
 // What comes of all frames together.
@@ -79,6 +80,7 @@ void ObservationLocalizer::sum_up(Localization& result) const {
     std::erase_if(result.map, [](const MapPoint& point) { return !point.is_known; });
   join_episodes(episodes_, whole ? std::span<const long>(whole->smoothed.ids) : std::span<const long>(), result.map);
   result.known_shift = known_shift(result.map, target.points);
+  if (whole && !config_.map && !target.board) result.moved_part = moved_part(result.map, target.points);
   result.is_behind = is_behind(result.path, target.points, target.seen_from_plus_z);
 }
 

@@ -36,10 +36,33 @@ void add_moved(const MovedPoints& moved, Verdict& verdict) {
   if (part > few || is_either) verdict.to_add = "make the map again";
 }
 
+/// The path is between where both parts put it, by more than its σ.
+void add_moved_part(const MovedPart& part, Verdict& verdict) {
+  constexpr double chance = 28.0;  // χ² of three, of some hundred parts: 99.9 %
+  const std::string all = std::to_string(part.num_given);
+  if (part.chi2 > chance)
+    verdict.checks.push_back({"target's points", State::care,
+                              std::to_string(part.num) + " of the target's " + all +
+                                  " points that are seen lie elsewhere than given against the others, by " +
+                                  distance_text(part.shift_m) + " (" + text_of(std::sqrt(part.chi2), 2) +
+                                  "σ): the path is between what both say",
+                              part.chi2, chance, "1", "path"});
+  else if (part.spread > part.spread_limit)
+    verdict.checks.push_back({"target's points", State::care,
+                              "the target's " + all + " points are " + text_of(std::sqrt(part.spread), 2) +
+                                  "σ off along one direction: some of them are not where they are given, and the "
+                                  "path is between what all say",
+                              part.spread, part.spread_limit, "1", "path"});
+  else
+    return;
+  verdict.to_add = "measure the target's points again";
+}
+
 }  // namespace
 
 void add_map(const Localization& report, Verdict& verdict) {
   add_moved(report.moved_points, verdict);
+  add_moved_part(report.moved_part, verdict);
   if (report.lacks_map_frame)
     verdict.checks.push_back({"map's file", State::care,
                               "the map's file does not say how well its frame is known: σ is against the map, and not "

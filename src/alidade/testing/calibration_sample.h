@@ -57,7 +57,7 @@ inline Calibration sample_calibration(std::vector<BoardView> views, const Calibr
   PhotoCalibration photos;
   photos.reasons.resize(views.size());
   photos.size = sample_size;
-  photos.report = calibrate(sample_board, views, sample_size, config);
+  photos.report = calibrate(sample_board, views, sample_size, config, config.board_points);
   photos.views = std::move(views);
   return judge_calibration(sample_board, std::move(photos), config);
 }

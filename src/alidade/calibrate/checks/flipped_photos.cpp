@@ -84,7 +84,7 @@ void reject_flipped_photos(const Board& board, ImageSize size, const CalibrateCo
     if (!(rms_px[worst] > suspicious * median_of_used(rms_px))) return;
     std::vector<BoardView> others = views;
     others[worst].corners.clear();
-    CalibrateReport without = calibrate(board, others, size, config);
+    CalibrateReport without = calibrate(board, others, size, config, report.board_points);
     if (without.status != CalibrateReport::Status::converged) return;
     const Flip* const flip = flip_of(board, views[worst], without, median_of_used(used_rms_px(others, without)));
     if (flip == nullptr) return;

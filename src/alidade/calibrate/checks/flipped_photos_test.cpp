@@ -44,6 +44,19 @@ TEST(FlippedPhotos, AreNamed) {
   }
 }
 
+TEST(FlippedPhotos, AreNamedOfABoardThatIsGiven) {
+  constexpr std::uint64_t seed = 3;
+  const BoardScene scene = testing::covered_scene(camera_off_centre(), 14, seed);
+  std::vector<BoardView> views = testing::sample_views(scene, seed);
+  views[4] = flipped(views[4], true, false);
+  CalibrateConfig config;
+  config.board_shape = BoardShape::given;
+  config.board_points = points_in_board(testing::sample_board);
+  const Calibration result = testing::sample_calibration(views, config);
+  ASSERT_EQ(result.status, CalibrateReport::Status::converged);
+  EXPECT_THAT(result.views[4].reason, ::testing::HasSubstr("mirrored left to right they do"));
+}
+
 /// Corners that are wrong for another reason are no flipped image's.
 TEST(FlippedPhotos, AreNotSeenInCornersOfAnotherBoard) {
   constexpr std::uint64_t seed = 3;

@@ -12,13 +12,6 @@ namespace {
 
 constexpr double largest_number = 1e12;  // metres, pixels, seconds since 1970: all far below; their squares are finite
 
-std::string_view trimmed(std::string_view text) {
-  const auto is_space = [](char c) { return c == ' ' || c == '\t'; };
-  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
-  return text;
-}
-
 /// A cell as it may stand in a message: short, in one line.
 std::string in_quotes(std::string_view cell) {
   constexpr std::size_t longest = 40;
@@ -68,7 +61,7 @@ class Splitter {
     }
     if (take('"')) return quoted_cell();
     const std::size_t end = std::min(text_.find_first_of(ends(), at_), text_.size());
-    std::string cell(trimmed(text_.substr(at_, end - at_)));
+    std::string cell(csv_trimmed(text_.substr(at_, end - at_)));
     at_ = end;
     if (separator_ != ',') std::replace(cell.begin(), cell.end(), ',', '.');
     return cell;
@@ -177,7 +170,7 @@ std::size_t skip_comments(std::string_view& text) {
   while (!text.empty()) {
     const std::size_t end = text.find_first_of("\r\n");
     const std::string_view first = text.substr(0, end);
-    if (!trimmed(first).empty() && !is_csv_comment(first)) break;
+    if (!csv_trimmed(first).empty() && !is_csv_comment(first)) break;
     text.remove_prefix(end == std::string_view::npos ? text.size() : end);
     if (text.starts_with("\r\n")) text.remove_prefix(1);
     if (!text.empty()) text.remove_prefix(1);

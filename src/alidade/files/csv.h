@@ -37,6 +37,9 @@ struct CsvPlace {
 /// Text as a cell: quoted where it must be.
 [[nodiscard]] std::string csv_cell(const std::string& text);
 
+/// Without spaces and tabs at its ends.
+[[nodiscard]] std::string_view csv_trimmed(std::string_view text);
+
 /// A time as seconds, of a column in seconds (unit 1), ms, µs or ns since 1970; unit 0: by how large the number is.
 [[nodiscard]] double csv_time_s(const std::string& cell, double unit_s, const CsvPlace& place);
 

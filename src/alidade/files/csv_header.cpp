@@ -45,15 +45,8 @@ constexpr std::array<Word, 9> words{
     {"tilt", "tilt", 1.0, 1.0, "rad"},     {"pitch", "tilt", 1.0, 1.0, "rad"},
     {"elevation", "tilt", 1.0, 1.0, "rad"}};
 
-std::string_view without_spaces(std::string_view text) {
-  const auto is_space = [](char c) { return c == ' ' || c == '\t'; };
-  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
-  return text;
-}
-
 std::string_view without_mark(std::string_view text) {
-  while (text.starts_with('#') || text.starts_with('%')) text = without_spaces(text.substr(1));
+  while (text.starts_with('#') || text.starts_with('%')) text = csv_trimmed(text.substr(1));
   return text;
 }
 
@@ -62,12 +55,12 @@ std::pair<std::string_view, std::string_view> name_and_brackets(std::string_view
   const std::size_t open = column.find_last_of("[(");
   if (open == std::string_view::npos || open == 0 || !(column.ends_with(']') || column.ends_with(')')))
     return {column, {}};
-  return {without_spaces(column.substr(0, open)), column.substr(open + 1, column.size() - open - 2)};
+  return {csv_trimmed(column.substr(0, open)), column.substr(open + 1, column.size() - open - 2)};
 }
 
 std::string tidy_name(std::string_view column) {
   const auto [name, brackets] = name_and_brackets(column);
-  const Unit* const unit = unit_called(without_spaces(brackets));
+  const Unit* const unit = unit_called(csv_trimmed(brackets));
   if (unit == nullptr) return std::string(column);
   const std::string_view ascii = unit->name == "°" ? "deg" : unit->name == "µs" ? "us" : unit->name;
   return std::string(name) + "_" + std::string(ascii);
@@ -94,6 +87,13 @@ std::string at_header(const CsvRow& header, const std::string& name) {
 
 }  // namespace
 
+std::string_view csv_trimmed(std::string_view text) {
+  const auto is_space = [](char c) { return c == ' ' || c == '\t'; };
+  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
+  return text;
+}
+
 /// Clocks count seconds, or their thousandths since 1970, which no log in seconds reaches.
 double csv_time_s(const std::string& cell, double unit_s, const CsvPlace& place) {
   constexpr double min_ms = 1e11, min_us = 1e14, min_ns = 1e17, largest_ns = 1e19;
@@ -111,7 +111,7 @@ char csv_separator(std::string_view text) {
 }
 
 bool is_csv_comment(std::string_view line) {
-  line = without_spaces(line.substr(0, line.find_first_of("\r\n")));
+  line = csv_trimmed(line.substr(0, line.find_first_of("\r\n")));
   if (!line.starts_with('#') && !line.starts_with('%')) return false;
   const char separator = csv_separator(line);
   if (line.find(separator) == std::string_view::npos) return true;
@@ -119,7 +119,7 @@ bool is_csv_comment(std::string_view line) {
   for (bool is_last = false; !is_last;) {
     const std::size_t end = line.find(separator);
     is_last = end == std::string_view::npos;
-    const std::string_view name = name_and_brackets(without_spaces(line.substr(0, end))).first;
+    const std::string_view name = name_and_brackets(csv_trimmed(line.substr(0, end))).first;
     if (name.empty() || name.find(' ') != std::string_view::npos) return true;
     if (!is_last) line.remove_prefix(end + 1);
   }

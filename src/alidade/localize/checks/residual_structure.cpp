@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <vector>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -23,21 +27,29 @@ class MeanResidual {
     constexpr std::size_t few_points = 8;
     return num_ >= least && (!lasts || of_point_.size() >= few_points);
   }
+  /// Changes of the residuals by something that all of them share.
+  void add_moves(const Eigen::RowVectorXd& moves) {
+    if (moves_.size() == 0) moves_.setZero(moves.size());
+    moves_ += moves;
+  }
+  [[nodiscard]] Eigen::RowVectorXd moves() const { return moves_ / num_; }
   [[nodiscard]] double mean() const { return sum_ / num_; }
   [[nodiscard]] double mean_px() const { return sum_px_ / num_; }
-  /// The mean's square over its variance, 1 by chance. Of points: a square of Student's t with one number less than
-  /// they are, over its own mean.
-  [[nodiscard]] double chi2(bool lasts) const {
-    if (!lasts) return sum_ * sum_ / num_;
+  /// Of the mean, by chance. Of points: its square over that is one of Student's t with one number less than they are,
+  /// over its own mean.
+  [[nodiscard]] double variance(bool lasts) const {
+    if (!lasts) return 1.0 / num_;
     double squares = 0.0;
     for (const auto& [id, sum] : of_point_) squares += sum * sum;
     const double dof = static_cast<double>(of_point_.size()) - 1.0;
-    return sum_ * sum_ / squares * (dof - 2.0) / dof;
+    return squares / (num_ * num_) * dof / (dof - 2.0);
   }
+  [[nodiscard]] double chi2(bool lasts) const { return mean() * mean() / variance(lasts); }
 
  private:
   double num_ = 0.0, sum_ = 0.0, sum_px_ = 0.0;
   std::map<long, double> of_point_;
+  Eigen::RowVectorXd moves_;
 };
 
 struct ImagePart {
@@ -106,7 +118,27 @@ ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, 
   return structure;
 }
 
-RadialStructure radial_structure(std::span<const PlacedResidual> residuals, const Camera& camera, bool lasts) {
+namespace {
+
+/// Squares of the means over their covariance, which have in common what moves them together.
+double chi2_of(std::span<const MeanResidual> means, bool lasts, bool has_moves) {
+  const auto num = static_cast<Eigen::Index>(means.size());
+  Eigen::VectorXd mean(num);
+  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num, num);
+  for (Eigen::Index i = 0; i < num; ++i) {
+    const MeanResidual& at = means[static_cast<std::size_t>(i)];
+    mean[i] = at.mean();
+    cov(i, i) += at.variance(lasts);
+    for (Eigen::Index j = 0; has_moves && j < num; ++j)
+      cov(i, j) += at.moves().dot(means[static_cast<std::size_t>(j)].moves());
+  }
+  return squared_mahalanobis(mean, cov);
+}
+
+}  // namespace
+
+RadialStructure radial_structure(std::span<const PlacedResidual> residuals, const Camera& camera, bool lasts,
+                                 const ResidualMoves& moves) {
   constexpr std::size_t num_rings = 6;
   constexpr double least = 10.0;
   const Eigen::Vector2d middle = 0.5 * Eigen::Vector2d(camera.width_px, camera.height_px);
@@ -116,20 +148,22 @@ RadialStructure radial_structure(std::span<const PlacedResidual> residuals, cons
     if (!(out.norm() > 1.0)) continue;
     const double along_px = out.normalized().dot(residual.residual_px);
     const double share = std::min(out.norm() / middle.norm(), 0.999);
-    rings[static_cast<std::size_t>(share * num_rings)].add(residual.id, along_px / residual.sigma_px, along_px);
+    MeanResidual& ring = rings[static_cast<std::size_t>(share * num_rings)];
+    ring.add(residual.id, along_px / residual.sigma_px, along_px);
+    if (moves) ring.add_moves(out.normalized().transpose() / residual.sigma_px * moves(residual));
   }
+  std::vector<MeanResidual> judged;
+  std::ranges::copy_if(rings, std::back_inserter(judged),
+                       [&](const MeanResidual& ring) { return ring.has_enough(least, lasts); });
   RadialStructure structure;
-  double num = 0.0;
-  for (const MeanResidual& ring : rings) {
-    if (!ring.has_enough(least, lasts)) continue;
-    num += 1.0;
+  for (const MeanResidual& ring : judged) {
     structure.share += ring.mean() * ring.mean();
-    structure.chi2_per_ring += ring.chi2(lasts);
     structure.worst_px = std::max(structure.worst_px, std::abs(ring.mean_px()));
   }
-  if (!(num > 0.0)) return structure;
+  if (judged.empty()) return structure;
+  const auto num = static_cast<double>(judged.size());
   structure.share = std::sqrt(structure.share / num);
-  structure.chi2_per_ring /= num;
+  structure.chi2_per_ring = chi2_of(judged, lasts, static_cast<bool>(moves)) / num;
   return structure;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <functional>
 #include <span>
 
 #include "alidade/localize/localization.h"
@@ -11,8 +13,12 @@ namespace alidade {
 /// variance of a mean is that of the points' sums, and a mean of few points says nothing.
 [[nodiscard]] ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, const Camera& camera);
 
-/// The same in rings about the image centre, of what is off outward or inward. `lasts`: errors do.
+/// By how much a residual changes [px] where the lens is off by σ, path and map following: by independent columns.
+using ResidualMoves = std::function<Eigen::Matrix2Xd(const PlacedResidual&)>;
+
+/// The same in rings about the image centre, of what is off outward or inward. `lasts`: errors do. What a lens within
+/// its covariance leaves is chance (`moves`; none: it is exact).
 [[nodiscard]] RadialStructure radial_structure(std::span<const PlacedResidual> residuals, const Camera& camera,
-                                               bool lasts);
+                                               bool lasts, const ResidualMoves& moves = {});
 
 }  // namespace alidade

@@ -87,6 +87,25 @@ bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   return squared_mahalanobis(score, information) > best_cause(all);
 }
 
+/// Of what of a lens is given with a covariance. `spread`: while its poses' rows are those of the equations.
+ResidualMoves PathSmoother::moves_by_lens(const Eigen::MatrixXd& considered, const Asked& asked,
+                                          const PoseChain::Spread& spread) const {
+  const Eigen::Index num = considered.rows() - num_causes;
+  if (num == 0 || considered.topLeftCorner(num, num).isZero(0.0)) return {};
+  const SymmetricEigen by = symmetric_eigen(considered.topLeftCorner(num, num));
+  const Eigen::MatrixXd root = by.vectors * by.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd J_estimated = asked.J.block(lens_at_, 0, num_estimated_, num);
+  return [this, num, root, J_estimated, &spread](const PlacedResidual& residual) -> Eigen::Matrix2Xd {
+    const std::size_t i = residual.index, point = point_of_[i];
+    const auto rows = rows_of(state_, i, Twist::Zero(), true);
+    if (!rows || !lives_[point]) return Eigen::Matrix2Xd::Zero(2, num);
+    const Eigen::Matrix2Xd J =
+        rows->J_shared.middleCols(num_estimated_, num) + rows->J_shared.leftCols(num_estimated_) * J_estimated +
+        rows->J_pose * spread.J[residual.frame].leftCols(num) + rows->J_point * spread.point_J[point].leftCols(num);
+    return residual.error_factor * residual.sigma_px * (J * root);
+  };
+}
+
 namespace {
 
 /// Of a focal length that is not of this lens as it was used: the largest error, up to any of a lens, that its score

@@ -165,7 +165,7 @@ std::vector<PlacedResidual> PathSmoother::placed_residuals() const {
     const auto px = project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point_of_[i]]);
     if (!px) continue;
     residuals.push_back({observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px,
-                         error_factors_[point_of_[i]]});
+                         error_factors_[point_of_[i]], i});
   }
   return residuals;
 }

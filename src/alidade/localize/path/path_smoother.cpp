@@ -229,7 +229,6 @@ SmoothedPath PathSmoother::finished(const SmootherSystem& system) {
   path.structure = residual_structure(path.residuals, state_.camera);
   path.structure.autocorrelation = structure_.autocorrelation;  // that of the errors that were taken for independent
   path.structure.sigma_autocorrelation = structure_.sigma_autocorrelation;
-  path.radial = radial_structure(path.residuals, state_.camera, structure_.is_autocorrelated());
   path.num_dropped = problem_.observations.size() - observations_.size();
   if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.given_in_world.has_value(); }))
     widen(system.cost, path);
@@ -319,13 +318,15 @@ SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
   fill_imu(system, cov, asked, path);
   align(system, considered, spread);
   path.world_from_cam = state_.poses;
+  fill_map(spread.point_cov, path);
+  path.radial = radial_structure(path.residuals, state_.camera, structure_.is_autocorrelated(),
+                                 moves_by_lens(considered, asked, spread));
   for (std::size_t k = 0; k < state_.poses.size(); ++k) {
     Eigen::Matrix<double, 6, 6> to_camera = Eigen::Matrix<double, 6, 6>::Identity();
     to_camera.topLeftCorner<3, 3>() = state_.poses[k].rotation.toRotationMatrix().transpose();
     path.cov.push_back(to_camera * spread.cov[k] * to_camera.transpose());
     spread.J[k] = to_camera * spread.J[k];
   }
-  fill_map(spread.point_cov, path);
   fill_frame(system, considered, spread, path);
   fill_lens(cov, path);
   const std::vector<int> given(lens_order_.begin() + num_estimated_, lens_order_.end());

@@ -37,6 +37,7 @@ struct PlacedResidual {
   Eigen::Vector2d px, residual_px;
   double sigma_px = 0.5;      ///< As stated,
   double error_factor = 1.0;  ///< and how much larger the errors of this point are found to be.
+  std::size_t index = 0;      ///< Among the observations of the path.
 };
 
 /// The gauge freedom of a path: where there is some, its covariance is that after the best alignment.

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "alidade/localize/checks/residual_structure.h"
 #include "alidade/localize/path/path_smoother.h"
 #include "alidade/localize/path/pose_chain.h"
 
@@ -130,6 +131,8 @@ class PathSmoother {
   [[nodiscard]] double motion_score(const SmootherSystem& system, const Eigen::VectorXd& direction,
                                     const PoseChain::Steps& at_rest) const;
   [[nodiscard]] double best_cause(const Asked& all) const;
+  [[nodiscard]] ResidualMoves moves_by_lens(const Eigen::MatrixXd& considered, const Asked& asked,
+                                            const PoseChain::Spread& spread) const;
   /// path_imu.cpp.
   void begin_imu();
   void leave_out_blows();

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <utility>
 
@@ -12,6 +11,7 @@
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/solve/port.h"
 #include "alidade/calibrate/solve/weights.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -69,7 +69,7 @@ std::string points_fault(const std::vector<Eigen::Vector3d>& points) {
     if (far_m > max_m) return fmt::format("board_points: point {} is {:.3g} m away; they are in metres", i, far_m);
     spread += (points[i] - points.front()) * (points[i] - points.front()).transpose();
   }
-  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();  // ascending
+  const Eigen::Vector3d squares = symmetric_eigen3(spread).values;  // ascending
   return squares[1] > 1e-8 * squares[2] ? "" : "board_points: they all lie on one line, or in one place";
 }
 

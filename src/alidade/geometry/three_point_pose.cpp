@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
@@ -15,11 +17,10 @@ std::vector<double> real_roots(const std::array<double, 5>& c) {
   Eigen::Matrix4d companion = Eigen::Matrix4d::Zero();
   companion.diagonal(-1).setOnes();
   for (int i = 0; i < 4; ++i) companion(i, 3) = -c[static_cast<std::size_t>(i)] / c[4];
-  const Eigen::EigenSolver<Eigen::Matrix4d> solver(companion, false);
-  if (solver.info() != Eigen::Success) return {};
+  if (!companion.allFinite()) return {};
   std::vector<double> roots;
   constexpr double nearly_real = 1e-4;  // of a double root; noise parts them by its square root
-  for (const std::complex<double>& root : solver.eigenvalues())
+  for (const std::complex<double>& root : eigenvalues_of(companion))
     if (std::abs(root.imag()) < nearly_real * (1.0 + std::abs(root.real()))) roots.push_back(root.real());
   return roots;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/known_pose.h"
 #include "alidade/localize/path/path_resection.h"
 
@@ -183,7 +184,7 @@ double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const
   difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.motion.world_from_cam.rotation);
   const Eigen::Matrix<double, 6, 6> cov =
       now.motion_covariance().topLeftCorner<6, 6>() + from.cov.topLeftCorner<6, 6>();
-  return difference.dot(cov.inverse() * difference);
+  return squared_mahalanobis(difference, cov);
 }
 
 constexpr double max_contradiction = 22.5;  // χ² of six components: 99.9 %

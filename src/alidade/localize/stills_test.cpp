@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "alidade/geometry/so3.h"
 #include "alidade/localize.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/testing/hover.h"
@@ -17,7 +18,7 @@ struct Stills {
 
 Rigid3 looking_at_the_centre(Draws& draws) {
   const Eigen::Vector3d place(draws.uniform(-0.4, 0.4), draws.uniform(-0.3, 0.3), draws.uniform(-0.8, -0.45));
-  const Eigen::Quaterniond towards = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), -place);
+  const Eigen::Quaterniond towards = rotation_between(Eigen::Vector3d::UnitZ(), -place);
   return {
       towards * exp_so3(Eigen::Vector3d(draws.uniform(-0.1, 0.1), draws.uniform(-0.1, 0.1), draws.uniform(-1.0, 1.0))),
       place};

@@ -2,11 +2,12 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -85,8 +86,7 @@ std::optional<Eigen::Matrix<double, 9, 4>> null_space(std::span<const Eigen::Vec
     for (int r = 0; r < 3; ++r) products.block<3, 1>(3 * r, static_cast<int>(i)) = a(r) * b;
   }
   if (!products.allFinite()) return std::nullopt;
-  const Eigen::Matrix<double, 9, 9> Q = Eigen::HouseholderQR<Eigen::Matrix<double, 9, 5>>(products).householderQ();
-  return Q.rightCols<4>();
+  return orthonormal_basis(products, 9).rightCols<4>();
 }
 
 /// Multiplies the quadratic monomials by x, modulo the constraints: its eigenvectors are their values at the solutions.

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/estimation/config_error.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/imaging/image_codecs.h"
 #include "alidade/results/documents/number_columns.h"
 
@@ -17,9 +17,9 @@ namespace {
 
 /// Half axes and angle of the 3σ ellipse.
 cv::RotatedRect ellipse_3sigma(const BeamPixel& pixel) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(pixel.cov);
-  const Eigen::Vector2d sigma = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Vector2d along = axes.eigenvectors().col(1);
+  const SymmetricEigen axes = symmetric_eigen(pixel.cov);
+  const Eigen::Vector2d sigma = axes.values.cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector2d along = axes.vectors.col(1);
   return {cv::Point2f(static_cast<float>(pixel.px.x()), static_cast<float>(pixel.px.y())),
           cv::Size2f(static_cast<float>(6.0 * sigma[1]), static_cast<float>(6.0 * sigma[0])),
           static_cast<float>(std::atan2(along.y(), along.x()) * 180.0 / CV_PI)};

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 
 namespace alidade {
@@ -30,7 +30,7 @@ SigmaMapTrials::SigmaMapTrials(Camera truth, const std::vector<int>& free, const
     sigmas.push_back(detail::largest_sigma(cov));
   weights_ = detail::inverse_variance_weights(sigmas);
   for (const auto& cov : detail::implied_covariance(truth.cov, seen_, weights_, 0.0)) {
-    axes_.emplace_back(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(cov).eigenvectors().col(1));
+    axes_.emplace_back(symmetric_eigen(cov).vectors.col(1));
     bounds_px_.push_back(detail::largest_sigma(cov));
   }
 }

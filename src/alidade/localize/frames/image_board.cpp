@@ -1,9 +1,9 @@
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
 #include <opencv2/core.hpp>
 
 #include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/frames/image_localizer.h"
 
 // A board's corners look alike: by their surroundings one may be taken for its neighbour along the diagonal, and all
@@ -20,8 +20,7 @@ bool ImageLocalizer::may_mistake_corners() const {
     const auto expected = engine_.best().expected(point.id);
     if (!expected) continue;
     px.push_back(expected->px);
-    reach_px.push_back(sigmas *
-                       std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(expected->S).eigenvalues()[1]));
+    reach_px.push_back(sigmas * std::sqrt(symmetric_eigenvalues(expected->S)[1]));
   }
   if (px.size() < 2) return false;
   std::vector<double> apart_px;

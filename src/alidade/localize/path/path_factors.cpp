@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/path_system.h"
 
 // What a path is solved from beside its observations (path_observations.cpp): known points, given distances, the
@@ -42,7 +43,7 @@ Eigen::MatrixXd PathSmoother::lens_information() const {
           problem_.camera.cov(lens_order_[static_cast<std::size_t>(i)], lens_order_[static_cast<std::size_t>(j)]);
     if (!(cov(i, i) > 0.0)) cov(i, i) = sigma * sigma;
   }
-  return cov.inverse();
+  return inverse_symmetric(cov);
 }
 
 /// Of what is given and not estimated: the rest of the lens, the target's scale; the other causes are taken for absent.
@@ -257,7 +258,7 @@ void PathSmoother::add_motion_and_pull(const SmootherState& state, std::size_t k
 void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system) const {
   if (!problem_.start) return;
   const Rigid3 &given = problem_.start->motion.world_from_cam, &is = state.poses.front();
-  const Eigen::Matrix<double, 6, 6> information = problem_.start->cov.topLeftCorner<6, 6>().inverse();
+  const Eigen::Matrix<double, 6, 6> information = inverse_symmetric(problem_.start->cov.topLeftCorner<6, 6>());
   const Eigen::Vector3d phi = log_so3(given.rotation.conjugate() * is.rotation);
   Eigen::Vector<double, 6> error;
   error << is.translation - given.translation, phi;

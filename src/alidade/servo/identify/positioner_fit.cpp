@@ -94,7 +94,8 @@ PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVec
   const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-200).cwiseSqrt();
   Eigen::MatrixXd scaled = scale.asDiagonal().inverse() * normal * scale.asDiagonal().inverse();
   scaled.diagonal().array() += 1e-10;
-  const Eigen::MatrixXd inverse = scale.asDiagonal().inverse() * scaled.inverse().eval() * scale.asDiagonal().inverse();
+  const Eigen::MatrixXd inverse =
+      scale.asDiagonal().inverse() * inverse_symmetric(scaled) * scale.asDiagonal().inverse();
   std::map<int, PositionerVector> scores;
   for (std::size_t i = 0; i < problem.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);

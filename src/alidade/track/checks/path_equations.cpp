@@ -95,7 +95,7 @@ class Equations {
       instant.A.diagonal() << Eigen::Vector3d::Constant(1.0 / (anywhere_m * anywhere_m)),
           Eigen::Vector3d::Constant(1.0 / (any_m_s * any_m_s));
     } else {
-      const Six F = motion.transition_jacobian(before, *dt_s), inverse = motion.noise(*dt_s).inverse();
+      const Six F = motion.transition_jacobian(before, *dt_s), inverse = inverse_symmetric(motion.noise(*dt_s));
       const PathState off = now - F * before;
       Instant& last = instants_.back();
       last.A += F.transpose() * inverse * F;
@@ -149,7 +149,7 @@ class Equations {
         now.A -= G * now.before.transpose();
         now.right -= G * instants_[k - 1].right;
       }
-      inverse_.push_back(now.A.inverse());
+      inverse_.push_back(inverse_symmetric(now.A));
       const Eigen::MatrixXd solved = inverse_.back() * now.right;
       whole_.noalias() -= now.right.transpose() * solved;
     }

@@ -1,11 +1,11 @@
 #include "alidade/track/checks/track_assumed.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/track/checks/time_steps.h"
 #include "alidade/track/checks/unseen_errors.h"
 
@@ -322,10 +322,10 @@ std::vector<Eigen::MatrixXd> meeting_sensitivity(std::span<const RigHead> heads,
     information += J_points.back().transpose() * J_points.back();
   }
   if (J_points.size() < 2) return {};
-  const Eigen::FullPivLU<Eigen::Matrix3d> solve(information);
-  if (!solve.isInvertible()) return {};
+  const Ldlt ldlt(information);
+  if (!(ldlt.min_pivot() > 1e-14 * information.trace())) return {};
   for (std::size_t i = 0; i < J_points.size(); ++i)
-    by[J_params[i].first] = -solve.solve(J_points[i].transpose() * J_params[i].second);
+    by[J_params[i].first] = -ldlt.solve_each(J_points[i].transpose() * J_params[i].second);
   return by;
 }
 

@@ -69,7 +69,8 @@ detail::CameraContent read_yaml(const detail::CameraText& file) {
   const auto has = [&](const char* key) { return map[key].IsDefined(); };
   if (has_cameras_of_kalibr(root)) return detail::read_kalibr(root, file);
   if (has("distortion_model")) return detail::read_ros(root, file);
-  if (has("camera_matrix") || has("cameraMatrix") || has("distortion_coefficients") || (has("K") && has("D")))
+  if (has("camera_matrix") || has("cameraMatrix") || has("distortion_coefficients") || (has("K") && has("D")) ||
+      (has("M1") && has("D1")))
     return detail::read_opencv(root, file);
   if (has("model") || has("fx")) return {detail::read_alidade(root, file), {}};
   detail::refuse(file.name, "", unknown_file);

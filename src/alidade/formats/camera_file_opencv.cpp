@@ -107,9 +107,29 @@ bool is_fisheye_file(const Fields& fields, const std::vector<double>& k, const s
   return file.choice == "fisheye";
 }
 
+/// Of the pair that OpenCV's stereo sample writes, M1 D1 and M2 D2, the one that is wanted.
+CameraContent read_opencv_pair(const YAML::Node& root, const CameraText& file) {
+  std::vector<std::string> names;
+  for (const char* name : {"M1", "M2"})
+    if (root[name].IsDefined()) names.emplace_back(name);
+  const std::size_t chosen = chosen_camera(names, file);
+  const Fields fields(root, file.name);
+  for (const char* key : {"image_width", "image_height"})
+    if (!fields.has(key))
+      refuse(file.name, key, "is missing, as OpenCV's stereo sample leaves it: add that of the photos");
+  YAML::Node one(YAML::NodeType::Map);
+  one["camera_matrix"] = root[names[chosen]];
+  one["distortion_coefficients"] = root["D" + names[chosen].substr(1)];
+  for (const char* key : {"image_width", "image_height"}) one[key] = root[key];
+  CameraContent read = read_opencv(one, {file.text, file.name, ""});
+  read.unread = place_among(names, chosen);
+  return read;
+}
+
 }  // namespace
 
 CameraContent read_opencv(const YAML::Node& root, const CameraText& file) {
+  if (root["M1"].IsDefined() && root["D1"].IsDefined()) return read_opencv_pair(root, file);
   const Fields fields(root, file.name);
   const std::string matrix_key = first_of(fields, {"camera_matrix", "cameraMatrix", "K"});
   const std::string distortion_key = first_of(fields, {"distortion_coefficients", "distCoeffs", "dist_coeffs", "D"});
@@ -135,8 +155,8 @@ CameraContent read_opencv_xml(const CameraText& file) {
     for (const char* key : {"image_width", "image_height", "avg_reprojection_error", "fisheye_model"}) {
       if (storage[key].isInt() || storage[key].isReal()) root[key] = number_text(storage[key].real());
     }
-    for (const char* key :
-         {"camera_matrix", "cameraMatrix", "K", "distortion_coefficients", "distCoeffs", "dist_coeffs", "D"}) {
+    for (const char* key : {"camera_matrix", "cameraMatrix", "K", "distortion_coefficients", "distCoeffs",
+                            "dist_coeffs", "D", "M1", "D1", "M2", "D2"}) {
       if (!storage[key].isMap()) continue;
       cv::Mat values;
       storage[key].mat().convertTo(values, CV_64F);

@@ -42,5 +42,28 @@ TEST(CameraFile, FourCoefficientsOfOpenCvMayBeThoseOfEitherLens) {
   EXPECT_EQ(lens_doubt(file), "") << "five are of cv::calibrateCamera";
 }
 
+TEST(CameraFile, OfOpenCvsStereoPairOneIsChosen) {
+  const testing::TemporaryFolder folder;
+  const std::string file = (folder.path() / "intrinsics.yml").string();
+  const auto matrix = [](int rows, int cols, const std::string& data) {
+    return "!!opencv-matrix\n   rows: " + std::to_string(rows) + "\n   cols: " + std::to_string(cols) +
+           "\n   dt: d\n   data: [ " + data + " ]\n";
+  };
+  const std::string pair = "M1: " + matrix(3, 3, "530, 0., 320, 0., 531, 240, 0., 0., 1.") +
+                           "D1: " + matrix(1, 5, "-2.8e-01, 0.09, 1e-3, -2e-4, 0.") +
+                           "M2: " + matrix(3, 3, "540, 0., 330, 0., 541, 250, 0., 0., 1.") +
+                           "D2: " + matrix(1, 5, "-2.9e-01, 0.10, 0., 0., 0.");
+  write_file(file, "%YAML:1.0\n---\n" + pair);
+  EXPECT_THAT(fault_of([&] { (void)read_camera(file); }), HasSubstr("holds 2 cameras (M1, M2)"));
+  EXPECT_THAT(fault_of([&] { (void)read_camera(file + ":M2"); }), HasSubstr("image_width: is missing"));
+  write_file(file, "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n" + pair);
+  const Camera second = read_camera(file + ":M2");
+  EXPECT_EQ(params(second.lens)[1], 541.0);
+  EXPECT_EQ(params(second.lens)[5], -0.29);
+  EXPECT_EQ(params(read_camera(file + ":M1").lens)[0], 530.0);
+  EXPECT_THAT(fault_of([&] { (void)read_camera(file + ":left"); }), HasSubstr("it has M1, M2"));
+  EXPECT_THAT(unread_parts(file + ":M1"), ::testing::ElementsAre(HasSubstr("M1 of 2 cameras")));
+}
+
 }  // namespace
 }  // namespace alidade

@@ -167,7 +167,7 @@ FieldList fields_of(LocalizeArgs& args) {
        .form = "FILE"},
       {.name = "rate_hz",
        .value = &args.rate_hz,
-       .help = "Frames per second: times are frame numbers over this",
+       .help = "Frames per second: times are frame numbers over this (default: the video's own times)",
        .limits = {.min = 0.0, .is_above_min = true}},
   });
   append({{.name = "wait_s",

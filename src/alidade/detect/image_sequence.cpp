@@ -7,9 +7,11 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "alidade/files/files.h"
 #include "alidade/files/yaml_fields.h"
@@ -125,7 +127,10 @@ class ImageSequence {
 
  private:
   VideoFrames frames_;
-  std::vector<double> times_s_;  ///< One per image; empty: number over rate.
+  [[nodiscard]] double time_in_video(long frame);
+
+  std::vector<double> times_s_;  ///< One per image; empty: number over rate, or without one as the video says.
+  std::optional<double> first_s_, last_s_;  ///< In the video.
   double rate_hz_;
   int width_px_, height_px_;
   std::size_t count_ = 0;
@@ -141,8 +146,21 @@ ImageSequence::ImageSequence(const path& given, double rate_hz, int width_px, in
     throw InputError(given.string() + ": only a folder of numbered images can be waited for, not one with data.csv");
   if (!asl.table.empty())
     times_s_ = asl_times_s(asl.table, asl.images);
-  else if (!(rate_hz > 0.0))
+  else if (std::error_code ignored; !(rate_hz > 0.0) && std::filesystem::is_directory(given, ignored))
     throw InputError(given.string() + ": has no times; give --rate, frames a second");
+}
+
+/// As the video says, from its first frame on: phones do not film at one rate.
+double ImageSequence::time_in_video(long frame) {
+  const double t_s = frames_.time_s();
+  if (!std::isfinite(t_s)) throw InputError(frames_.name() + ": has no times; give --rate, frames a second");
+  if (last_s_ && !(t_s > *last_s_))
+    throw InputError(
+        fmt::format("{}: the time of frame {} is not after the one before it; give --rate, frames a second",
+                    frames_.name(), frame));
+  if (!first_s_) first_s_ = t_s;
+  last_s_ = t_s;
+  return t_s - *first_s_;
 }
 
 bool ImageSequence::next(cv::Mat& grey, long& frame, double& t_s) {
@@ -153,7 +171,10 @@ bool ImageSequence::next(cv::Mat& grey, long& frame, double& t_s) {
         fmt::format("{}: is {}×{}, the camera {}×{}", frames_.name(), image.cols, image.rows, width_px_, height_px_));
   image.convertTo(grey, CV_8U);
   frame = static_cast<long>(frames_.number());
-  t_s = times_s_.empty() ? static_cast<double>(frame) / rate_hz_ : times_s_.at(count_);
+  if (!times_s_.empty())
+    t_s = times_s_.at(count_);
+  else
+    t_s = rate_hz_ > 0.0 ? static_cast<double>(frame) / rate_hz_ : time_in_video(frame);
   if (!times_s_.empty()) frame = static_cast<long>(count_);
   ++count_;
   return true;

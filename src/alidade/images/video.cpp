@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -86,6 +87,10 @@ class VideoFrames::Impl {
     number = process_ ? count_ : numbers_[count_];
     ++count_;
     return frame;
+  }
+
+  [[nodiscard]] double time_s() const {
+    return process_ ? process_->time().media_s : std::numeric_limits<double>::quiet_NaN();
   }
 
   std::string name;
@@ -189,6 +194,7 @@ VideoFrames::~VideoFrames() = default;
 
 cv::Mat VideoFrames::next() { return impl_->next(); }
 std::size_t VideoFrames::number() const { return impl_->number; }
+double VideoFrames::time_s() const { return impl_->time_s(); }
 std::size_t VideoFrames::num_frames() const { return impl_->num_frames; }
 const std::string& VideoFrames::name() const { return impl_->name; }
 

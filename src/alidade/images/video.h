@@ -38,6 +38,8 @@ class VideoFrames {
   /// Number of the frame that next() gave, the first 0: images that are missing from a folder leave a gap. Where not
   /// all names end in a number of up to nine digits, images are counted.
   [[nodiscard]] std::size_t number() const;
+  /// Its time by the video's own clock [s]; NaN: the video has none, or it is a folder.
+  [[nodiscard]] double time_s() const;
   /// How many there will be; 0: not known, as where more may come. For showing progress.
   [[nodiscard]] std::size_t num_frames() const;
   /// File or folder, to begin a message with.

@@ -1,18 +1,19 @@
 #include "alidade/estimation/cluster_covariance.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 
-#include "alidade/geometry/decompositions.h"
-
 namespace alidade {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using SymmetricSolver = Eigen::SelfAdjointEigenSolver<MatrixXd>;
 
 /// A B. A product of small matrices is done before a blocked one has packed them.
 template <typename A, typename B>
@@ -44,17 +45,17 @@ struct Member {
 
 /// With share = C Cᵀ: y = C⁻¹ step, m = C⁻¹ taken C⁻ᵀ.
 Principal principal_of(const MatrixXd& share, const MatrixXd* taken, const VectorXd& step) {
-  const SymmetricEigen own = symmetric_eigen(0.5 * (share + share.transpose()));
-  const VectorXd size = own.values.cwiseMax(0.0).cwiseSqrt();
+  const SymmetricSolver own(0.5 * (share + share.transpose()));
+  const VectorXd size = own.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   const VectorXd inverse = size.unaryExpr([](double s) { return s > 1e-6 ? 1.0 / s : 0.0; });
-  Principal principal{own.vectors * size.asDiagonal(), inverse.cwiseProduct(own.vectors.transpose() * step),
-                      own.values};
+  Principal principal{own.eigenvectors() * size.asDiagonal(),
+                      inverse.cwiseProduct(own.eigenvectors().transpose() * step), own.eigenvalues()};
   if (taken != nullptr) {
-    const MatrixXd to_y = inverse.asDiagonal() * own.vectors.transpose();
-    const SymmetricEigen leverage = symmetric_eigen(to_y * *taken * to_y.transpose());
-    principal.along *= leverage.vectors;
-    principal.y = leverage.vectors.transpose() * principal.y;
-    principal.rest = leverage.values;
+    const MatrixXd to_y = inverse.asDiagonal() * own.eigenvectors().transpose();
+    const SymmetricSolver leverage(to_y * *taken * to_y.transpose());
+    principal.along *= leverage.eigenvectors();
+    principal.y = leverage.eigenvectors().transpose() * principal.y;
+    principal.rest = leverage.eigenvalues();
   }
   principal.rest = (1.0 - principal.rest.array()).max(min_rest);
   principal.y.array() /= principal.rest.array().sqrt();
@@ -87,7 +88,7 @@ Member member_of(ClusterStep&& cluster, double noise_variance, double equal_shar
   member.trace = member.share.trace();
   const bool has_taken = cluster.taken.size() > 0;
   MatrixXd leverage;
-  if (has_taken) leverage = Ldlt(member.share).solve_each(cluster.taken).transpose();
+  if (has_taken) leverage = member.share.ldlt().solve(cluster.taken).transpose();
   const MatrixXd& m = has_taken ? leverage : member.share;
   constexpr double small = 0.2;  // of a norm, a bound of the leverage
   if (m.squaredNorm() < small * small) {
@@ -271,8 +272,9 @@ void state_whitened(const MatrixXd& L, double noise_variance, std::vector<Cluste
   const Scatter scatter = scatter_of(members, directions, equal_shares);
   result.design_effect = scatter.mean;
   result.shrinkage = scatter.shrinkage;
-  const SymmetricEigen excess = symmetric_eigen(scatter.excess());
-  const MatrixXd raised = excess.vectors * excess.values.cwiseMax(0.0).asDiagonal() * excess.vectors.transpose();
+  const SymmetricSolver excess(scatter.excess());
+  const MatrixXd raised =
+      excess.eigenvectors() * excess.eigenvalues().cwiseMax(0.0).asDiagonal() * excess.eigenvectors().transpose();
   VectorXd widen(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const double dof = stated_dof(scatter, scatter.dof[j], directions.row(j).transpose());
@@ -289,16 +291,16 @@ void state_whitened(const MatrixXd& L, double noise_variance, std::vector<Cluste
 void state_free(const MatrixXd& inverse, double noise_variance, std::span<const ClusterStep> clusters,
                 ClusterCovariance& result) {
   const Eigen::Index n = inverse.rows();
-  const Llt llt(inverse);
-  if (n == 0 || !llt.is_positive() || !(noise_variance > 0.0)) return;
-  const MatrixXd whiten = llt.whitened(MatrixXd::Identity(n, n));
+  const Eigen::LLT<MatrixXd> llt(inverse);
+  if (n == 0 || llt.info() != Eigen::Success || !(noise_variance > 0.0)) return;
+  const MatrixXd whiten = llt.matrixL().solve(MatrixXd::Identity(n, n));
   std::vector<ClusterStep> whitened;
   whitened.reserve(clusters.size());
   for (const ClusterStep& cluster : clusters) {
     whitened.push_back({whiten * cluster.step, product(product(whiten, cluster.spread), whiten.transpose()), {}});
     if (cluster.taken.size() > 0) whitened.back().taken = product(product(whiten, cluster.taken), whiten.transpose());
   }
-  state_whitened(llt.lower(), noise_variance, std::move(whitened), result);
+  state_whitened(llt.matrixL(), noise_variance, std::move(whitened), result);
 }
 
 /// The model's covariance, which is used where clusters give no information.

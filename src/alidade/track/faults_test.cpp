@@ -107,6 +107,29 @@ TEST(TrackFaults, AreNamedAndNeverCalledGood) {
   }
 }
 
+/// By a table whose columns are named as one another, of one head or of both.
+TEST(TrackFaults, ExchangedColumnsAreNamed) {
+  const auto pixels = [](TargetObservation& row) { std::swap(row.px.x(), row.px.y()); };
+  const auto angles = [](TargetObservation& row) { std::swap(row.pan_tilt_rad.x(), row.pan_tilt_rad.y()); };
+  for (const char* scenario : {"B", "G"}) {
+    const TrackScene scene = *track_scenario(scenario);
+    for (const bool is_of_both : {true, false}) {
+      const auto named = [&](const auto& exchange) {
+        std::vector<TargetObservation> observations = testing::observations_of(scene, 1);
+        for (TargetObservation& row : observations)
+          if (is_of_both || row.head == 1) exchange(row);
+        const TrackReport report = track_target(observations, scene.heads, {});
+        const Verdict verdict = track_verdict(report, observations, scene.heads, {});
+        EXPECT_EQ(verdict.state, State::refused) << scenario;
+        return verdict.sentence;
+      };
+      const std::string of = is_of_both ? "" : " of head 2";
+      EXPECT_NE(named(pixels).find("u and v" + of + " exchanged"), std::string::npos) << scenario << named(pixels);
+      EXPECT_NE(named(angles).find("pan and tilt" + of + " exchanged"), std::string::npos) << scenario << named(angles);
+    }
+  }
+}
+
 /// Heads that follow keep the target central, where mirrored images nearly fit: their handedness is looked at before
 /// clocks, times and the target's motion.
 TEST(TrackFaults, MirroredImagesOfAllHeadsAreNamedFirst) {

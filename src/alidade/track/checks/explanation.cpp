@@ -94,6 +94,17 @@ void add_mirrors(std::span<const RigHead> heads, std::optional<std::size_t> head
                               }));
 }
 
+/// Columns that are named as one another, of one head, or of all.
+void add_exchanges(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
+  const std::string of = head ? " of " + head_name(heads, *head) : "";
+  all.push_back(hypothesis_of(
+      head, "pan and tilt" + of + " exchanged", "exchange pan_rad and tilt_rad: then the events fit the rig",
+      [](TargetObservation& observation) { std::swap(observation.pan_tilt_rad.x(), observation.pan_tilt_rad.y()); }));
+  all.push_back(hypothesis_of(
+      head, "u and v" + of + " exchanged", "exchange u_px and v_px (row and column): then the events fit the rig",
+      [](TargetObservation& observation) { std::swap(observation.px.x(), observation.px.y()); }));
+}
+
 void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
   add_signs(heads, head, all);
   add_mirrors(heads, head, all);
@@ -112,7 +123,11 @@ std::vector<Hypothesis> hypotheses(std::span<const RigHead> heads) {
                        observation.head = observation.head == a ? b : observation.head == b ? a : observation.head;
                      }});
   add_turned(heads, std::nullopt, all);
-  for (std::size_t head = 0; head < num; ++head) add_turned(heads, head, all);
+  add_exchanges(heads, std::nullopt, all);
+  for (std::size_t head = 0; head < num; ++head) {
+    add_turned(heads, head, all);
+    add_exchanges(heads, head, all);
+  }
   return all;
 }
 

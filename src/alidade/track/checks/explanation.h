@@ -32,9 +32,9 @@ struct Trial {
                                                          std::span<const RigHead> heads, const FollowConfig& config,
                                                          std::span<const RigFault> faults);
 
-/// Swapped heads, a wrong sign of an angle or a mirrored image, of all heads or of one, degrees, a head that is not
-/// the rig's: the one under which the observations fit and are the most probable. Two of them where they are nearly
-/// equally probable; none where none lets the observations fit.
+/// Swapped heads, exchanged columns, a wrong sign of an angle or a mirrored image, of all heads or of one, degrees, a
+/// head that is not the rig's: the one under which the observations fit and are the most probable. Two of them where
+/// they are nearly equally probable; none where none lets the observations fit.
 [[nodiscard]] std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
                                                         std::span<const RigHead> heads, const FollowConfig& config);
 

@@ -135,6 +135,14 @@ TEST_F(CameraCommand, FourCoefficientsOfOpenCvAreAskedAbout) {
   const Outcome chosen = alidade({"show", "c.yml:fisheye"});
   EXPECT_THAT(chosen.out, HasSubstr("kannala_brandt"));
   EXPECT_THAT(chosen.out, Not(HasSubstr("say which lens")));
+  for (const std::string& camera : {std::string("c.yml"), std::string("c.yml:fisheye")}) {  // named by rig.yaml
+    write_file(folder.path() / "rig.yaml", "heads:\n- camera: " + camera + "\n");
+    const Outcome outcome = alidade::testing::run_program(
+        {ALIDADE_EXECUTABLE, "project", "--rig", "rig.yaml", "--pan", "0", "--tilt", "0", "--point", "0", "0", "2"},
+        folder.path().string());
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(outcome.out.find("say which lens it is") != std::string::npos, camera == "c.yml") << outcome.out;
+  }
 }
 
 TEST_F(CameraCommand, ConvertSaysWhatOfTheFileIsNotInTheOther) {

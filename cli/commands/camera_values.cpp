@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "alidade/formats/camera_file.h"
+#include "alidade/formats/rig_file.h"
 #include "alidade/report/markup.h"
 
 namespace alidade::cli {
@@ -16,6 +17,11 @@ void add_camera_input(Run& run, const std::filesystem::path& file) {
   run.add_input("camera", name, read_file(file_of_camera(file)));
   if (const std::string doubt = lens_doubt(file); !doubt.empty())
     run.add_doubt(name + ": " + doubt, "say which lens it is: " + name + ":fisheye, or " + name + ":brown");
+}
+
+void add_rig_input(Run& run, const std::filesystem::path& file) {
+  run.add_input("rig", file);
+  for (const std::filesystem::path& camera : camera_files_of_rig(file)) add_camera_input(run, camera);
 }
 
 Camera read_camera_input(Run& run, const std::filesystem::path& file) {

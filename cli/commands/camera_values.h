@@ -12,6 +12,8 @@ namespace alidade::cli {
 
 /// Records a camera file among the inputs of the run, FILE:NAME too, and that its lens is in doubt where it is.
 void add_camera_input(Run& run, const std::filesystem::path& file);
+/// The same of rig.yaml, which read_rig() has read, and of the camera files that it names.
+void add_rig_input(Run& run, const std::filesystem::path& file);
 /// Reads a camera file and records it among the inputs of the run. "FILE:NAME" chooses one of several.
 [[nodiscard]] Camera read_camera_input(Run& run, const std::filesystem::path& file);
 

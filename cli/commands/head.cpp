@@ -23,6 +23,7 @@
 #include "cli/app/board_options.h"
 #include "cli/app/live.h"
 #include "cli/app/terminal.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/head_live.h"
 
@@ -302,8 +303,8 @@ void take_identified(const HeadArgs& args, HeadFollowConfig& config, Run& run) {
 
 ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   LiveRun live(args.live, run);
-  run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
+  add_rig_input(run, args.rig);
   if (rig.heads.size() != 1) throw InputError(args.rig + ": one head is followed with; this rig has another number");
   load_look(args.look);
   const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device, options_of(args));

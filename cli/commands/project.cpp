@@ -57,8 +57,8 @@ ExitCode project_beam(ProjectArgs args, Run& run) {
 }
 
 ExitCode project_heads(const ProjectArgs& args, Run& run) {
-  run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
+  add_rig_input(run, args.rig);
   if (!rig.intrinsics_histories.empty())
     throw InputError(args.rig.string() + ": intrinsics: change with time, which `project` is not given; give a camera");
   std::optional<Eigen::Vector3d> point_in_world;

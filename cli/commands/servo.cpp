@@ -13,6 +13,7 @@
 #include "cli/app/live.h"
 #include "cli/app/option_checks.h"
 #include "cli/app/pace.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -70,7 +71,7 @@ ServoResult studied(const ServoScenario& scenario, live::ServoStream& stream, Li
 ExitCode run_servo_command(const ServoArgs& args, Run& run) {
   run.add_input("scenario", args.scenario);
   const ServoScenarioFile read = read_servo_scenario(args.scenario);
-  if (!read.rig.empty()) run.add_input("rig", read.rig);
+  if (!read.rig.empty()) add_rig_input(run, read.rig);
   if (!read.track.empty()) run.add_input("track", read.track);
   const ServoScenario scenario = with_options(read.scenario, args);
   run.lap("read");

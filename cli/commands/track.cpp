@@ -21,6 +21,7 @@
 #include "cli/app/live.h"
 #include "cli/app/standard_input.h"
 #include "cli/app/truth_times.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -157,8 +158,8 @@ ExitCode follow_input(const TrackArgs& args, const Rig& rig, const TrueTrack& tr
 ExitCode run_track(TrackArgs args, Run& run) {
   check_inputs(args);
   require_sense(args.config);
-  run.add_input("rig", args.rig);
   Rig rig = read_rig(args.rig);
+  add_rig_input(run, args.rig);
   read_intrinsics_histories(args, rig, run);
   TrueTrack truth;
   if (!args.truth.empty()) {

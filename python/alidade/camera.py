@@ -4,6 +4,7 @@ from __future__ import annotations
 import math
 import os
 import types
+import warnings
 from typing import Any, Callable
 
 import numpy as np
@@ -53,8 +54,15 @@ class Camera:
 
     @classmethod
     def read(cls, file: str | os.PathLike[str]) -> Camera:
-        """A camera file of any known format: alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP. "camchain.yaml:cam1" chooses."""
-        return cls._of(_alidade.read_camera(file_name(file)))
+        """A camera file of any known format: alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP. "camchain.yaml:cam1" chooses.
+        A file of OpenCV that does not say whose its four coefficients are is read as brown, with a warning:
+        "file.yml:fisheye" or "file.yml:brown" decides."""
+        name = file_name(file)
+        camera = cls._of(_alidade.read_camera(name))
+        if doubt := _alidade.lens_doubt(name):
+            said = os.fsdecode(name)
+            warnings.warn(f"{said}: {doubt}; say which lens it is: {said}:fisheye, or {said}:brown", stacklevel=2)
+        return camera
 
     def write(self, file: str | os.PathLike[str], format: str = "alidade", *, lossy: bool = False) -> None:
         """Writes "alidade", "opencv", "ros", "kalibr", "mrcal" or "colmap". What the format cannot hold is a ValueError,

@@ -223,6 +223,7 @@ void bind_camera(py::module_& module) {
       });
   module.def("parameter_names", [](const std::string& model) { return param_names(lens_of(model)); });
   module.def("read_camera", [](const std::string& file) { return read_camera(file); });
+  module.def("lens_doubt", [](const std::string& file) { return lens_doubt(file); });
   module.def("parse_camera", [](const std::string& text, const std::string& name) { return parse_camera(text, name); });
   module.def("camera_from_opencv", &camera_of_opencv);
 }

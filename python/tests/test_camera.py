@@ -5,6 +5,7 @@ import tempfile
 import threading
 import time
 import unittest
+import warnings
 
 import cv2
 import mrcal
@@ -173,6 +174,20 @@ class Values(unittest.TestCase):
                 self.known.write(f"{folder}/camera", "kalibr")
             with self.assertRaisesRegex(ValueError, "absent.yaml"):
                 al.Camera.read(f"{folder}/absent.yaml")
+
+    def test_four_coefficients_of_opencv_are_asked_about(self):
+        matrix = "{{rows: {}, cols: {}, dt: d, data: {}}}"
+        text = (f"%YAML:1.0\n---\nimage_width: 160\nimage_height: 120\ncamera_matrix: !!opencv-matrix "
+                f"{matrix.format(3, 3, [90, 0, 80, 0, 90, 60, 0, 0, 1])}\ndistortion_coefficients: !!opencv-matrix "
+                f"{matrix.format(4, 1, [0.02, 0.01, -0.004, 0.001])}\n")
+        with tempfile.TemporaryDirectory() as folder:
+            with open(f"{folder}/c.yml", "w") as file:
+                file.write(text)
+            with self.assertWarnsRegex(UserWarning, "k1 k2 k3 k4 of cv::fisheye.*c.yml:fisheye, or .*c.yml:brown"):
+                self.assertEqual(al.Camera.read(f"{folder}/c.yml").model, "brown")
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                self.assertEqual(al.Camera.read(f"{folder}/c.yml:fisheye").model, "kannala_brandt")
 
     def test_a_file_is_read_not_constructed(self):
         import pathlib

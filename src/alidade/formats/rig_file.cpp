@@ -273,6 +273,16 @@ Rig read_rig(const std::filesystem::path& file) {
   return rig;
 }
 
+std::vector<std::filesystem::path> camera_files_of_rig(const std::filesystem::path& file) {
+  const YAML::Node heads = detail::load_yaml(read_file(file), file.string())["heads"];
+  std::vector<std::filesystem::path> files;
+  for (std::size_t i = 0; heads.IsDefined() && heads.IsSequence() && i < heads.size(); ++i) {
+    const YAML::Node camera = heads[i].IsMap() ? heads[i]["camera"] : YAML::Node();
+    if (camera.IsDefined() && camera.IsScalar()) files.push_back(file.parent_path() / camera.as<std::string>());
+  }
+  return files;
+}
+
 std::map<int, Camera> read_cameras_by_head(const std::vector<std::filesystem::path>& files, const std::vector<int>& ids,
                                            const std::filesystem::path& table) {
   const std::string fault = camera_count_fault(ids, files.size());

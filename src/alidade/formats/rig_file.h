@@ -21,6 +21,9 @@ ALIDADE_PUBLIC_BEGIN
 /// looks like degrees, two heads of one id, something that is no covariance. A head's `intrinsics` is read along.
 [[nodiscard]] Rig read_rig(const std::filesystem::path& file);
 
+/// The camera files that it names, in the order of its heads; of what read_rig() refuses perhaps none.
+[[nodiscard]] std::vector<std::filesystem::path> camera_files_of_rig(const std::filesystem::path& file);
+
 /// Reads the camera of each head of a table: one file for all, or one for each head in the order of `ids`. Throws
 /// InputError: another number of files (`table` is named), a camera that cannot be read or is not central.
 [[nodiscard]] std::map<int, Camera> read_cameras_by_head(const std::vector<std::filesystem::path>& files,

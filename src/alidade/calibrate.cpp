@@ -59,8 +59,14 @@ std::vector<std::string> port_faults(const CalibrateConfig& config) {
   return {};
 }
 
+double extent_of(const std::vector<Eigen::Vector3d>& points) {
+  double far_m = 0.0;
+  for (const Eigen::Vector3d& point : points) far_m = std::max(far_m, (point - points.front()).norm());
+  return far_m;
+}
+
 /// What is wrong with given points of a board, whatever its shape; empty where nothing is.
-std::string points_fault(const std::vector<Eigen::Vector3d>& points) {
+std::string points_fault(const std::vector<Eigen::Vector3d>& points, const Board& board) {
   constexpr double max_m = 1e6;
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -70,7 +76,12 @@ std::string points_fault(const std::vector<Eigen::Vector3d>& points) {
     spread += (points[i] - points.front()) * (points[i] - points.front()).transpose();
   }
   const Eigen::Vector3d squares = symmetric_eigen3(spread).values;  // ascending
-  return squares[1] > 1e-8 * squares[2] ? "" : "board_points: they all lie on one line, or in one place";
+  if (!(squares[1] > 1e-8 * squares[2])) return "board_points: they all lie on one line, or in one place";
+  constexpr double other_unit = 9.0;  // no bow, and no tape that slips, moves the last point so far
+  const double given_m = extent_of(points), nominal_m = extent_of(points_in_board(board));
+  if (given_m < other_unit * nominal_m && nominal_m < other_unit * given_m) return {};
+  return fmt::format("board_points: they reach {:.3g} m far, by the board's pitch {:.3g} m: they are in metres",
+                     given_m, nominal_m);
 }
 
 /// Throws ConfigError with every fault of what was asked.
@@ -83,7 +94,7 @@ void require_sense(CalibrateConfig config, const Board& board) {
     found.push_back("the board has " + std::to_string(num_points(board)) + " points, but " + std::to_string(num_given) +
                     " are given");
   } else if (config.board_shape == BoardShape::given) {
-    if (std::string of_points = points_fault(config.board_points); !of_points.empty())
+    if (std::string of_points = points_fault(config.board_points, board); !of_points.empty())
       found.push_back(std::move(of_points));
   }
   if (config.board_shape != BoardShape::given && num_given > 0)

@@ -120,6 +120,9 @@ TEST(CalibrateFace, AnswersBoardsThatCannotBe) {
   EXPECT_EQ(fault_with([](const Eigen::Vector3d& X) -> Eigen::Vector3d { return X; }), "");
   EXPECT_EQ(times(std::nan("")), "board_points: point 0 is not finite");
   EXPECT_THAT(times(1e300), ::testing::HasSubstr("m away; they are in metres"));
+  EXPECT_EQ(times(1.3), "");
+  for (const double unit : {1000.0, 0.001})
+    EXPECT_THAT(times(unit), ::testing::ContainsRegex("they reach .* by the board's pitch .* they are in metres"));
   EXPECT_EQ(times(0.0), "board_points: they all lie on one line, or in one place");
   EXPECT_EQ(fault_with([](const Eigen::Vector3d& X) -> Eigen::Vector3d {
               return {X.x(), 2.0 * X.x(), 0.0};

@@ -167,8 +167,9 @@ void add_show(App& app) {
   command
       .add_option(
           "file", args->file,
-          "Camera of alidade, OpenCV, ROS, Kalibr, mrcal or COLMAP, of SceneLib, of Civera's initialize_cam.m or of "
-          "Heikkilä's toolbox; FILE:NAME of several, FILE:fisheye of four coefficients of cv::fisheye")
+          "Camera of alidade, OpenCV, ROS, Kalibr, mrcal or COLMAP, of SceneLib, of Civera's initialize_cam.m, of "
+          "Heikkilä's toolbox or of Bouguet's (Calib_Results.m); FILE:NAME of several, FILE:fisheye of four "
+          "coefficients of cv::fisheye")
       ->required();
 }
 

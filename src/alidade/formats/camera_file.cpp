@@ -20,7 +20,7 @@ constexpr std::array<std::pair<CameraFormat, std::string_view>, 6> format_names{
                                                                                  {CameraFormat::colmap, "colmap"}}};
 
 constexpr const char* unknown_file =
-    "is not a camera file of alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP, SceneLib, Civera or Heikkilä";
+    "is not a camera file of alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP, SceneLib, Civera, Heikkilä or Bouguet";
 
 std::string_view trimmed(std::string_view text) {
   const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };

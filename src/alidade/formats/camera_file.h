@@ -14,8 +14,8 @@ ALIDADE_PUBLIC_BEGIN
 
 /// `opencv` is cv::FileStorage (YAML; XML and JSON are read too), `ros` a camera_info YAML, `kalibr` a camchain YAML,
 /// `mrcal` a .cameramodel, `colmap` a cameras.txt. Read, but not written, are also the camera files of SceneLib
-/// (Davison), of Civera's initialize_cam.m and of Heikkilä & Silvén's toolbox. The traps of each:
-/// docs/maths/camera-models.md.
+/// (Davison), of Civera's initialize_cam.m and of the toolboxes of Heikkilä & Silvén and of Bouguet (Calib_Results.m).
+/// The traps of each: docs/maths/camera-models.md.
 enum class CameraFormat { alidade, opencv, ros, kalibr, mrcal, colmap };
 
 /// Reads a camera file of any known format, recognised by its content. Of a file with several cameras one is chosen by

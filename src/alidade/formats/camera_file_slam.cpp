@@ -11,7 +11,8 @@
 
 // Cameras of the first monocular SLAM programs and of the calibration before them: A. J. Davison's SceneLib
 // (`cam.fku = 195;`), J. Civera's initialize_cam.m (two distortion parameters), J. Heikkilä & O. Silvén's toolbox of
-// 1997 (`sys` and `par`). Assignments, one or more a line. Their pixel (0, 0) is assumed to be the centre of the first.
+// 1997 (`sys` and `par`), J.-Y. Bouguet's Calib_Results.m. Assignments, one or more a line. Their pixel (0, 0) is the
+// centre of the first; of all but Bouguet's that is assumed.
 
 namespace alidade::detail {
 namespace {
@@ -58,9 +59,20 @@ std::vector<double> numbers_of(std::string text, const Values& known) {
   return numbers;
 }
 
+/// Rows of a vector in brackets are separated as statements are; here by spaces.
+std::string with_flat_vectors(std::string_view text) {
+  std::string flat(text);
+  bool is_inside = false;
+  for (char& c : flat) {
+    is_inside = c == '[' || (is_inside && c != ']' && c != '\n');
+    if (is_inside && c == ';') c = ' ';
+  }
+  return flat;
+}
+
 Values assignments(std::string_view text) {
   Values values;
-  std::istringstream lines{std::string(text)};
+  std::istringstream lines{with_flat_vectors(text)};
   for (std::string line; std::getline(lines, line);) {
     std::istringstream statements(without_comment(line));
     for (std::string each; std::getline(statements, each, ';');) {
@@ -219,16 +231,50 @@ Camera heikkila_camera(const Values& values, const CameraText& file) {
   return camera;
 }
 
+/// Exact: fc, cc, alpha_c, kc (k1 k2 p1 p2 k3), nx, ny. Of its fisheye, four coefficients, the file does not say that
+/// it is one.
+CameraContent bouguet_camera(const Values& values, const CameraText& file) {
+  const auto of_size = [&](const char* key, std::size_t least, std::size_t most) {
+    const auto at = values.find(key);
+    if (at == values.end()) refuse(file.name, key, "is not given as numbers");
+    if (at->second.size() < least || at->second.size() > most)
+      refuse(file.name, key, fmt::format("has {} numbers", at->second.size()));
+    return at->second;
+  };
+  const std::vector<double> fc = of_size("fc", 2, 2), cc = of_size("cc", 2, 2), kc = of_size("kc", 4, 5);
+  const bool is_open = kc.size() == 4 && kc != std::vector<double>(4, 0.0);
+  if (!file.choice.empty() && !(is_open && (file.choice == "brown" || file.choice == "fisheye")))
+    refuse(file.name, "", "holds one camera without a name; leave ':" + file.choice + "' out");
+  CameraContent read;
+  if (is_open && file.choice.empty())
+    read.doubt = "the 4 numbers of kc may be k1 k2 p1 p2 (read so: brown) or k1 k2 k3 k4 of the toolbox's fisheye";
+  read.camera = file.choice == "fisheye" ? fisheye_camera({fc[0], fc[1], cc[0], cc[1]}, kc, file.name, "kc")
+                                         : opencv_camera({fc[0], fc[1], cc[0], cc[1]}, kc, file.name, "kc");
+  Eigen::VectorXd lens = params(read.camera.lens);
+  lens[4] = fc[0] * (values.contains("alpha_c") ? number(values, "alpha_c", file) : 0.0);
+  read.camera.lens = with_params(read.camera.lens, lens);
+  read.camera.width_px = size(values, "nx", file);
+  read.camera.height_px = size(values, "ny", file);
+  read.camera.source = "J.-Y. Bouguet's toolbox";
+  if (values.contains("fc_error")) read.unread.emplace_back("its errors, three σ without correlations");
+  return read;
+}
+
+bool is_bouguet(const Values& values) {
+  return values.contains("fc") && values.contains("cc") && values.contains("kc");
+}
+
 }  // namespace
 
 bool is_slam_camera(std::string_view text) {
   const Values values = assignments(text);
-  return values.contains("cam.fku") || (values.contains("sys") && values.contains("par")) ||
+  return values.contains("cam.fku") || is_bouguet(values) || (values.contains("sys") && values.contains("par")) ||
          text.find("two_distortion_parameters") != std::string_view::npos;
 }
 
 CameraContent read_slam_camera(const CameraText& file) {
   const Values values = assignments(file.text);
+  if (is_bouguet(values)) return bouguet_camera(values, file);
   if (values.contains("cam.fku")) {
     std::vector<std::string> unread;
     if (values.contains("state.rw_x")) unread.emplace_back("the start and the features of its map");

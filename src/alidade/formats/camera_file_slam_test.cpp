@@ -2,7 +2,9 @@
 
 #include <cmath>
 
+#include "alidade/files/files.h"
 #include "alidade/formats/camera_file.h"
+#include "alidade/testing/temporary_folder.h"
 
 // Camera files of others whose distortion is written the other way round, against their own formulas.
 
@@ -99,6 +101,59 @@ TEST(SlamCameraFile, HeikkilasIsExact) {
     ASSERT_TRUE(px);
     EXPECT_LT((*px - Eigen::Vector2d(u, v)).norm(), 1e-9);
   }
+}
+
+/// As the toolbox writes it; against its own equations.
+TEST(SlamCameraFile, BouguetsIsExact) {
+  const std::string text =
+      "% Intrinsic and Extrinsic Camera Parameters\n%-- Focal length:\n"
+      "fc = [ 657.643749676532490 ; 658.041127811203660 ];\n%-- Principal point:\n"
+      "cc = [ 303.192390 ; 242.555660 ];\nalpha_c = 0.00042;\n"
+      "kc = [ -0.25610 ; 0.13089 ; -0.00019 ; 0.00004 ; 0.02 ];\n"
+      "fc_error = [ 0.40243 ; 0.43056 ];\nnx = 640;\nny = 480;\nn_ima = 25;\t\nest_dist = [ 1 ; 1 ; 1 ; 1 ; 0 ];\n";
+  const Camera camera = parse_camera(text, "Calib_Results.m");
+  EXPECT_EQ(camera.width_px, 640);
+  EXPECT_EQ(camera.height_px, 480);
+  for (const Eigen::Vector2d& x :
+       {Eigen::Vector2d(0.1, -0.2), Eigen::Vector2d(-0.4, 0.3), Eigen::Vector2d(0.45, 0.3)}) {
+    const double r2 = x.squaredNorm();
+    const double radial = 1.0 - 0.25610 * r2 + 0.13089 * r2 * r2 + 0.02 * r2 * r2 * r2, p1 = -0.00019, p2 = 0.00004;
+    const double xd = radial * x[0] + 2.0 * p1 * x[0] * x[1] + p2 * (r2 + 2.0 * x[0] * x[0]);
+    const double yd = radial * x[1] + p1 * (r2 + 2.0 * x[1] * x[1]) + 2.0 * p2 * x[0] * x[1];
+    const Eigen::Vector2d expected(657.643749676532490 * (xd + 0.00042 * yd) + 303.192390,
+                                   658.041127811203660 * yd + 242.555660);
+    const auto px = project(camera, {2.0 * x[0], 2.0 * x[1], 2.0});
+    ASSERT_TRUE(px);
+    EXPECT_LT((*px - expected).norm(), 1e-9);
+  }
+  const auto fault = [](const std::string& changed, const std::string& choice = "") {
+    try {
+      (void)parse_camera(changed, "m", choice);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("read");
+  };
+  EXPECT_NE(fault(text, "left").find("leave ':left' out"), std::string::npos);
+  EXPECT_EQ(fault(text.substr(0, text.find("nx ="))), "m: nx: is not given as a number");
+  EXPECT_EQ(fault("fc = [1 ; 2 ; 3]; cc = [1 ; 2]; kc = zeros(5,1);\n fc_error = [1 ; 2];"),
+            "m: is not a camera file of alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP, SceneLib, Civera, Heikkilä or "
+            "Bouguet");
+  EXPECT_EQ(fault("fc = [1 ; 2 ; 3]; cc = [1 ; 2]; kc = [0 ; 0 ; 0 ; 0 ; 0];"), "m: fc: has 3 numbers");
+}
+
+/// Four coefficients are those of its fisheye, or of an old version.
+TEST(SlamCameraFile, FourCoefficientsOfBouguetAreAskedAbout) {
+  const testing::TemporaryFolder folder;
+  const std::string file = (folder.path() / "Calib_Results.m").string();
+  write_file(
+      file, "fc = [ 300 ; 301 ];\ncc = [ 320 ; 240 ];\nkc = [ 0.02 ; 0.01 ; -0.004 ; 0.001 ];\nnx = 640;\nny = 480;\n");
+  EXPECT_EQ(model_name(read_camera(file).lens), "brown");
+  EXPECT_NE(lens_doubt(file).find("k1 k2 k3 k4 of the toolbox's fisheye"), std::string::npos);
+  const Camera fisheye = read_camera(file + ":fisheye");
+  EXPECT_EQ(model_name(fisheye.lens), "kannala_brandt");
+  EXPECT_EQ(params(fisheye.lens)[8], 0.001);
+  EXPECT_EQ(lens_doubt(file + ":fisheye") + lens_doubt(file + ":brown"), "");
 }
 
 TEST(SlamCameraFile, WhatIsMissingOrSenselessIsNamed) {

@@ -47,7 +47,8 @@ struct CameraContent {
 
 /// Whether a text is one of the camera files that read_slam_camera() knows.
 [[nodiscard]] bool is_slam_camera(std::string_view text);
-/// SceneLib's configuration, Civera's initialize_cam.m, Heikkilä & Silvén's `sys` and `par`: read, not written.
+/// SceneLib's configuration, Civera's initialize_cam.m, Heikkilä & Silvén's `sys` and `par`, Bouguet's
+/// Calib_Results.m: read, not written.
 [[nodiscard]] CameraContent read_slam_camera(const CameraText& file);
 
 /// The index of the wanted camera among those of a file; refuses where the choice is not clear, and names them.

@@ -79,6 +79,9 @@ detail::CameraContent read_yaml(const detail::CameraText& file) {
 detail::CameraContent recognise_and_read(const detail::CameraText& file) {
   const std::string_view content = without_comments(file.text);
   if (content.empty()) detail::refuse(file.name, "", "is empty");
+  if (content.starts_with("MATLAB 5.0"))
+    detail::refuse(file.name, "",
+                   "is a MAT-file, which is not read; Calib_Results.m, which the toolbox saves with it, is");
   if (file.text.find('\0') != std::string_view::npos)
     detail::refuse(file.name, "", "is not text; " + std::string(unknown_file));
   if (content.starts_with("<?xml")) return detail::read_opencv_xml(file);

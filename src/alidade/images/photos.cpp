@@ -9,6 +9,7 @@
 #include "alidade/images/exif.h"
 #include "alidade/images/foreign_images.h"
 #include "alidade/imaging/image_codecs.h"
+#include "alidade/imaging/tiff_image.h"
 
 namespace alidade {
 namespace {
@@ -135,7 +136,10 @@ cv::Mat decode_photo(std::string_view bytes) {
   const std::string as_stored = untagged_tiff(bytes);
   if (!as_stored.empty()) bytes = as_stored;
   cv::Mat photo = decode_image(bytes);
-  if (photo.empty()) throw InputError("not an image that can be read");
+  if (photo.empty()) {
+    const std::string numbers = foreign_numbers(bytes);
+    throw InputError(numbers.empty() ? "not an image that can be read" : numbers);
+  }
   return photo;
 }
 

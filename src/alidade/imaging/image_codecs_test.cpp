@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/imaging/image_size.h"
+#include "alidade/imaging/tiff_image.h"
 #include "alidade/testing/random.h"
 
 namespace alidade {
@@ -63,6 +64,14 @@ TEST(ImageCodecs, ReadWhatOpencvReads) {
       expect_same(decode_image(bytes), by_opencv(bytes, as_stored), ending + std::string(" ") + std::to_string(type));
     }
   }
+}
+
+TEST(ImageCodecs, SayWhyATiffIsNoPhoto) {
+  const std::string floats = encoded(".tiff", cv::Mat(20, 30, CV_32FC1, cv::Scalar(0.5)));
+  EXPECT_TRUE(decode_image(floats).empty());
+  EXPECT_EQ(foreign_numbers(floats), "a TIFF of 32-bit floating-point numbers: save it with 8 or 16 bits");
+  for (const int type : {CV_8UC1, CV_16UC3}) EXPECT_EQ(foreign_numbers(encoded(".tiff", noise(type))), "");
+  EXPECT_EQ(foreign_numbers(encoded(".png", noise(CV_8UC1))) + foreign_numbers("II") + foreign_numbers(""), "");
 }
 
 TEST(ImageCodecs, ReadTiffsOfEveryCompression) {

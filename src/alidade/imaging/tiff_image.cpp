@@ -1,5 +1,6 @@
 #include "alidade/imaging/tiff_image.h"
 
+#include <fmt/format.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -122,13 +123,31 @@ cv::Mat read_colours(TIFF* tiff, const TiffShape& shape, bool keep_alpha) {
   return image;
 }
 
+using OpenTiff = std::unique_ptr<TIFF, TiffCloser>;
+
+OpenTiff opened(TiffSource& source) {
+  silence();
+  return OpenTiff(TIFFClientOpen("picture", "rm", &source, read_part, write_nothing, seek_to, close_nothing,
+                                 size_of_file, nullptr, nullptr));
+}
+
 }  // namespace
 
-cv::Mat decode_tiff(std::string_view bytes, bool keep_alpha) {
-  silence();
+std::string foreign_numbers(std::string_view bytes) {
+  if (!bytes.starts_with("II") && !bytes.starts_with("MM")) return {};
   TiffSource source{bytes};
-  const std::unique_ptr<TIFF, TiffCloser> tiff(TIFFClientOpen("picture", "rm", &source, read_part, write_nothing,
-                                                              seek_to, close_nothing, size_of_file, nullptr, nullptr));
+  const OpenTiff tiff = opened(source);
+  if (!tiff) return {};
+  const TiffShape shape = shape_of(tiff.get());
+  const bool is_float = shape.format == SAMPLEFORMAT_IEEEFP;
+  if (!is_float && shape.format == SAMPLEFORMAT_UINT && shape.bits <= 16) return {};
+  return fmt::format("a TIFF of {}-bit {} numbers: save it with 8 or 16 bits", shape.bits,
+                     is_float ? "floating-point" : "whole");
+}
+
+cv::Mat decode_tiff(std::string_view bytes, bool keep_alpha) {
+  TiffSource source{bytes};
+  const OpenTiff tiff = opened(source);
   if (!tiff) return {};
   const TiffShape shape = shape_of(tiff.get());
   if (shape.format != SAMPLEFORMAT_UINT || !is_possible_shape(tiff.get(), shape, bytes.size())) return {};

@@ -8,7 +8,7 @@
 #include "alidade/testing/hover.h"
 #include "alidade/testing/trials.h"
 
-// A focal length that is not of this lens as it was used, and of which few or noisy points say little.
+// A focal length, or a centre, that is not of this lens as it was used, and of which few or noisy points say little.
 
 namespace alidade {
 namespace {
@@ -18,8 +18,10 @@ struct Outcome {
   double most_sigmas = 0.0;  ///< Of any number of any pose.
 };
 
-Outcome told(double f, int num_others, double sigma_px, bool is_px_given, std::uint64_t seed) {
-  testing::HoverRun run = testing::hovering({.num_frames = 100, .num_others = num_others, .sigma_px = sigma_px}, seed);
+Outcome told(double f, int num_others, double sigma_px, bool is_px_given, std::uint64_t seed,
+             double dt_s = 1.0 / 30.0) {
+  testing::HoverRun run =
+      testing::hovering({.num_frames = 100, .num_others = num_others, .dt_s = dt_s, .sigma_px = sigma_px}, seed);
   Eigen::VectorXd lens = params(run.camera.lens), sigma = Eigen::VectorXd::Zero(10);
   lens.head<2>() *= f;
   sigma.head<4>().setConstant(0.3);
@@ -77,6 +79,43 @@ TEST(HiddenFocal, OfManyPointsIsNothing) {
   ASSERT_NE(focal, outcome.result.given.end());
   EXPECT_LT(focal->hidden, 0.012);
   EXPECT_LT(std::hypot(1.0, focal->moves * focal->sigma_hidden), 1.2);
+}
+
+/// Another centre is a camera that is rotated and displaced instead: with 12 px, ● up to 6.5σ off. What would not be
+/// named moves no number of a pose by more than 4σ.
+TEST(HiddenCentre, IsInSigma) {
+  bool is_counted = false;
+  for (const auto& [sigma_px, num_others] : {std::pair{0.5, 5}, std::pair{1.0, 30}}) {
+    const Outcome outcome = told(1.0, num_others, sigma_px, true, 2, 0.1);
+    for (const char* name : {"centre u", "centre v"}) {
+      const auto given = std::ranges::find(outcome.result.given, name, &GivenNumber::name);
+      ASSERT_NE(given, outcome.result.given.end());
+      EXPECT_GT(given->hidden, 3.0) << name;
+      EXPECT_LE(given->hidden, 0.02 * 768) << name;
+      const double enlarged = std::hypot(1.0, given->moves * given->sigma_hidden);
+      EXPECT_LT(given->moves * given->hidden / enlarged, 4.001) << name << " " << num_others;
+      is_counted = is_counted || enlarged > 1.05;
+    }
+    const auto row = std::ranges::find(outcome.result.assumed, "camera.cx", &Assumption::name);
+    ASSERT_NE(row, outcome.result.assumed.end());
+    EXPECT_LE(row->moves, 1.0);
+  }
+  EXPECT_TRUE(is_counted);
+}
+
+TEST(HiddenCentre, OfARightLensCostsLittle) {
+  const Outcome few = told(1.0, 30, 2.0, true, 1), many = told(1.0, 60, 0.5, true, 1);
+  for (const char* name : {"centre u", "centre v"}) {
+    const auto enlarged = [&](const Outcome& outcome) {
+      const auto given = std::ranges::find(outcome.result.given, name, &GivenNumber::name);
+      return given == outcome.result.given.end() ? 0.0 : std::hypot(1.0, given->moves * given->sigma_hidden);
+    };
+    EXPECT_GE(enlarged(few), 1.0) << name;
+    EXPECT_LT(enlarged(few), 1.5) << name;
+    EXPECT_GE(enlarged(many), 1.0) << name;
+    EXPECT_LT(enlarged(many), 1.2) << name;
+  }
+  EXPECT_EQ(few.result.verdict.state, State::good) << few.result.verdict.sentence;
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ void add_map(const Localization& report, Verdict& verdict);
 /// What sensors beside the camera say of a scale that is known without them, and two of them of each other.
 void add_sensors(const Localization& report, Verdict& verdict);
 
-/// Where σ has what of the focal length the observations would not show.
+/// Where σ has what of the focal length, or of the centre, the observations would not show.
 void add_hidden(const Localization& report, Verdict& verdict);
 
 /// Bad above `bad`, else care above `care`.

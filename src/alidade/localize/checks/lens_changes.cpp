@@ -107,16 +107,19 @@ std::string lens_changes(const Localization& report) {
 }
 
 void add_hidden(const Localization& report, Verdict& verdict) {
-  const auto focal = std::ranges::find(report.given, "focal length", &GivenNumber::name);
-  if (focal == report.given.end() || !(focal->sigma_hidden > 0.0)) return;
   constexpr double worth_a_word = 1.1;
-  const double enlarged = std::hypot(1.0, focal->moves * focal->sigma_hidden);
-  if (enlarged < worth_a_word) return;
-  verdict.checks.push_back({"focal length", State::good,
-                            "the observations would not show another focal length, by up to " +
-                                text_of(100.0 * focal->hidden, 2) + " %: σ is enlarged up to " + text_of(enlarged, 2) +
-                                " times for it",
-                            100.0 * focal->hidden, 0.0, "%", "path"});
+  for (const GivenNumber& given : report.given) {
+    const double enlarged = std::hypot(1.0, given.moves * given.sigma_hidden);
+    if (!(given.sigma_hidden > 0.0) || enlarged < worth_a_word) continue;
+    const bool is_focal = given.name == "focal length";
+    const double hidden = is_focal ? 100.0 * given.hidden : given.hidden;
+    const std::string unit = is_focal ? "%" : "px";
+    verdict.checks.push_back({std::string(given.name), State::good,
+                              "the observations would not show another " + std::string(given.name) + ", by up to " +
+                                  text_of(hidden, 2) + " " + unit + ": σ is enlarged up to " + text_of(enlarged, 2) +
+                                  " times for it",
+                              hidden, 0.0, unit, "path"});
+  }
 }
 
 }  // namespace alidade

@@ -108,46 +108,62 @@ ResidualMoves PathSmoother::moves_by_lens(const Eigen::MatrixXd& considered, con
 
 namespace {
 
-/// Of a focal length that is not of this lens as it was used: the largest error, up to any of a lens, that its score
-/// would not show, and the σ by which that moves no pose by more than 4σ. Few points before a target hardly tell a
-/// longer lens from a larger distance, while the camera file's σ is that of another day.
-void hide(GivenNumber& focal) {
-  constexpr double any = 0.04, named_z = 3.5, unseen_z = 2.4, most_sigmas = 4.0;
-  const double z = std::min(std::abs(focal.z), named_z);
-  focal.hidden = z > 0.0 ? std::min(std::abs(focal.asked / focal.z) * (z + unseen_z), any) : any;
-  if (!(focal.moves > 0.0)) return;
-  const double counted = focal.hidden / most_sigmas, by_path = 1.0 / focal.moves;
-  focal.sigma_hidden = std::sqrt(std::max(counted * counted - by_path * by_path, 0.0));
+/// What of a lens is not of it as it was used (another focus or zoom, a stabiliser), and how far any may be off.
+struct HiddenParam {
+  std::string_view given;
+  std::array<std::string_view, 2> names;  ///< Of its parameters.
+  double most;                            ///< Of a focal length over it, of a centre over the image's width.
+};
+constexpr std::array<HiddenParam, 3> hidden_params{
+    {{"focal length", {"fx", "fy"}, 0.04}, {"centre u", {"cx", ""}, 0.02}, {"centre v", {"cy", ""}, 0.02}}};
+
+/// The largest error, up to any of a lens, that its score would not show, and the σ by which that moves no pose by more
+/// than 4σ. Few points before a target hardly tell a longer lens from a larger distance, or another centre from a
+/// camera that is rotated, while the camera file's σ is that of another day.
+void hide(double any, GivenNumber& given) {
+  constexpr double named_z = 3.5, unseen_z = 2.4, most_sigmas = 4.0;
+  const double z = std::min(std::abs(given.z), named_z);
+  given.hidden = z > 0.0 ? std::min(std::abs(given.asked / given.z) * (z + unseen_z), any) : any;
+  if (!(given.moves > 0.0)) return;
+  const double counted = given.hidden / most_sigmas, by_path = 1.0 / given.moves;
+  given.sigma_hidden = std::sqrt(std::max(counted * counted - by_path * by_path, 0.0));
 }
 
 }  // namespace
 
 /// `path.given` and its ids are there.
 void PathSmoother::fill_hidden(const PoseChain::Spread& spread, SmoothedPath& path) const {
-  const auto focal = std::ranges::find(path.given, "focal length", &GivenNumber::name);
-  if (focal == path.given.end()) return;
-  hide(*focal);
-  if (!(focal->sigma_hidden > 0.0)) return;
   const std::vector<std::string> names = param_names(problem_.camera.lens);
-  Eigen::VectorXd move = Eigen::VectorXd::Zero(spread.J.front().cols());
-  for (int i = num_estimated_; i < static_cast<int>(lens_order_.size()); ++i) {
-    const auto at = static_cast<std::size_t>(lens_order_[static_cast<std::size_t>(i)]);
-    if (names[at] == "fx" || names[at] == "fy")
-      move[i - num_estimated_] = focal->sigma_hidden * given_lens_[static_cast<Eigen::Index>(at)];
+  for (const HiddenParam& param : hidden_params) {
+    const auto given = std::ranges::find(path.given, param.given, &GivenNumber::name);
+    if (given == path.given.end()) continue;
+    const bool is_focal = !param.names[1].empty();
+    if (!is_focal && problem_.gauge != PathGauge::fixed) continue;  // nothing says how such a world is rotated
+    hide(param.most * (is_focal ? 1.0 : problem_.camera.width_px), *given);
+    if (!(given->sigma_hidden > 0.0)) continue;
+    Eigen::VectorXd move = Eigen::VectorXd::Zero(spread.J.front().cols());
+    for (int i = num_estimated_; i < static_cast<int>(lens_order_.size()); ++i) {
+      const auto at = static_cast<std::size_t>(lens_order_[static_cast<std::size_t>(i)]);
+      if (std::ranges::find(param.names, names[at]) != param.names.end())
+        move[i - num_estimated_] = given->sigma_hidden * (is_focal ? given_lens_[static_cast<Eigen::Index>(at)] : 1.0);
+    }
+    SmoothedPath::Hidden& hidden = path.hidden.emplace_back();
+    for (const auto& J : spread.J) hidden.poses.emplace_back(J * move);
+    for (const long id : path.ids) hidden.points.emplace_back(spread.point_J[index_of_.at(id)] * move);
   }
-  for (const auto& J : spread.J) path.hidden.poses.emplace_back(J * move);
-  for (const long id : path.ids) path.hidden.points.emplace_back(spread.point_J[index_of_.at(id)] * move);
 }
 
 void PathSmoother::count_hidden(SmoothedPath& path) const {
-  if (path.hidden.poses.empty()) return;
-  for (std::size_t k = 0; k < path.cov.size(); ++k)
-    path.cov[k] += path.hidden.poses[k] * path.hidden.poses[k].transpose();
-  for (std::size_t i = 0; i < path.point_covs.size(); ++i)
-    path.point_covs[i] += path.hidden.points[i] * path.hidden.points[i].transpose();
-  if (problem_.gauge == PathGauge::fixed) return widen_frame(path.hidden.points, 1.0, path);
-  for (std::size_t i = 0; i < path.covs_in_map.size(); ++i)
-    path.covs_in_map[i] += path.hidden.points[i] * path.hidden.points[i].transpose();
+  for (const SmoothedPath::Hidden& hidden : path.hidden) {
+    for (std::size_t k = 0; k < path.cov.size(); ++k) path.cov[k] += hidden.poses[k] * hidden.poses[k].transpose();
+    for (std::size_t i = 0; i < path.point_covs.size(); ++i)
+      path.point_covs[i] += hidden.points[i] * hidden.points[i].transpose();
+    if (problem_.gauge == PathGauge::fixed)
+      widen_frame(hidden.points, 1.0, path);
+    else
+      for (std::size_t i = 0; i < path.covs_in_map.size(); ++i)
+        path.covs_in_map[i] += hidden.points[i] * hidden.points[i].transpose();
+  }
 }
 
 }  // namespace alidade

@@ -112,12 +112,12 @@ struct SmoothedPath {
   Eigen::VectorXd sigma_lens;  ///< and their σ.
   double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was given, in the given σ.
   std::vector<GivenNumber> given;
-  /// Moves of poses and points by the σ of what of the focal length does not show: they are in the covariances.
+  /// Moves of poses and points by the σ of what of a focal length or centre does not show: they are in the covariances.
   struct Hidden {
     std::vector<Eigen::Vector<double, 6>> poses;
     std::vector<Eigen::Vector3d> points;
   };
-  Hidden hidden;
+  std::vector<Hidden> hidden;
   std::vector<PlacedResidual> residuals;
   ResidualStructure structure;  ///< Autocorrelated errors are modelled in the path.
   RadialStructure radial;

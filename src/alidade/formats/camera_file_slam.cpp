@@ -272,8 +272,9 @@ bool is_slam_camera(std::string_view text) {
          text.find("two_distortion_parameters") != std::string_view::npos;
 }
 
-CameraContent read_slam_camera(const CameraText& file) {
-  const Values values = assignments(file.text);
+namespace {
+
+CameraContent read_assigned(const Values& values, const CameraText& file) {
   if (is_bouguet(values)) return bouguet_camera(values, file);
   if (values.contains("cam.fku")) {
     std::vector<std::string> unread;
@@ -282,6 +283,16 @@ CameraContent read_slam_camera(const CameraText& file) {
   }
   if (values.contains("sys") && values.contains("par")) return {heikkila_camera(values, file), {}};
   return {civera_camera(values, file), {}};
+}
+
+}  // namespace
+
+CameraContent read_slam_camera(const CameraText& file) {
+  CameraContent read = read_assigned(assignments(file.text), file);
+  constexpr double largest = 1e12;
+  if (!(params(read.camera.lens).cwiseAbs().maxCoeff() <= largest) || !params(read.camera.lens).allFinite())
+    refuse(file.name, "", "has a number that is not finite, or beyond 1e12");
+  return read;
 }
 
 }  // namespace alidade::detail

@@ -136,6 +136,11 @@ TEST(SlamCameraFile, BouguetsIsExact) {
   };
   EXPECT_NE(fault(text, "left").find("leave ':left' out"), std::string::npos);
   EXPECT_EQ(fault(text.substr(0, text.find("nx ="))), "m: nx: is not given as a number");
+  for (const char* wrong : {"nan", "-inf", "1e300"}) {
+    std::string changed = text;
+    EXPECT_EQ(fault(changed.replace(changed.find("-0.25610"), 8, wrong)),
+              "m: has a number that is not finite, or beyond 1e12");
+  }
   EXPECT_EQ(fault("fc = [1 ; 2 ; 3]; cc = [1 ; 2]; kc = zeros(5,1);\n fc_error = [1 ; 2];"),
             "m: is not a camera file of alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP, SceneLib, Civera, Heikkilä or "
             "Bouguet");

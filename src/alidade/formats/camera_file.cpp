@@ -124,11 +124,11 @@ std::string lens_doubt(const std::filesystem::path& file) { return read_content(
 
 std::filesystem::path file_of_camera(const std::filesystem::path& named) {
   const std::string name = named.string();
-  const std::size_t colon = name.rfind(':');
   std::error_code ignored;
-  const bool is_pair = !std::filesystem::exists(named, ignored) && colon != std::string::npos && colon > 0 &&
-                       std::filesystem::exists(name.substr(0, colon), ignored);
-  return is_pair ? std::filesystem::path(name.substr(0, colon)) : named;
+  if (std::filesystem::exists(named, ignored)) return named;
+  for (std::size_t colon = name.rfind(':'); colon != std::string::npos && colon > 0; colon = name.rfind(':', colon - 1))
+    if (std::filesystem::exists(name.substr(0, colon), ignored)) return name.substr(0, colon);
+  return named;
 }
 
 Camera read_central_camera(const std::filesystem::path& file) {

@@ -107,21 +107,25 @@ bool is_fisheye_file(const Fields& fields, const std::vector<double>& k, const s
   return file.choice == "fisheye";
 }
 
-/// Of the pair that OpenCV's stereo sample writes, M1 D1 and M2 D2, the one that is wanted.
+/// Of the pair that OpenCV's stereo sample writes, M1 D1 and M2 D2, the one that is wanted: "M1", or "M1:fisheye".
 CameraContent read_opencv_pair(const YAML::Node& root, const CameraText& file) {
   std::vector<std::string> names;
   for (const char* name : {"M1", "M2"})
     if (root[name].IsDefined()) names.emplace_back(name);
-  const std::size_t chosen = chosen_camera(names, file);
+  const std::size_t colon = std::min(file.choice.find(':'), file.choice.size());
+  const std::size_t chosen = chosen_camera(names, {file.text, file.name, file.choice.substr(0, colon)});
+  const std::string lens = file.choice.substr(std::min(colon + 1, file.choice.size()));
+  const std::string coefficients_key = "D" + names[chosen].substr(1);
   const Fields fields(root, file.name);
+  if (!fields.has(coefficients_key)) refuse(file.name, coefficients_key, "is missing");
   for (const char* key : {"image_width", "image_height"})
     if (!fields.has(key))
       refuse(file.name, key, "is missing, as OpenCV's stereo sample leaves it: add that of the photos");
   YAML::Node one(YAML::NodeType::Map);
   one["camera_matrix"] = root[names[chosen]];
-  one["distortion_coefficients"] = root["D" + names[chosen].substr(1)];
+  one["distortion_coefficients"] = root[coefficients_key];
   for (const char* key : {"image_width", "image_height"}) one[key] = root[key];
-  CameraContent read = read_opencv(one, {file.text, file.name, ""});
+  CameraContent read = read_opencv(one, {file.text, file.name, lens});
   read.unread = place_among(names, chosen);
   return read;
 }

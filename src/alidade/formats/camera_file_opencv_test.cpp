@@ -62,6 +62,15 @@ TEST(CameraFile, OfOpenCvsStereoPairOneIsChosen) {
   EXPECT_EQ(params(second.lens)[5], -0.29);
   EXPECT_EQ(params(read_camera(file + ":M1").lens)[0], 530.0);
   EXPECT_THAT(fault_of([&] { (void)read_camera(file + ":left"); }), HasSubstr("it has M1, M2"));
+  EXPECT_THAT(fault_of([&] { (void)read_camera(file + ":M1:fisheye"); }), HasSubstr("leave ':fisheye' out"));
+  const std::string four = pair.substr(0, pair.find("D1")) + "D1: " + matrix(1, 4, "0.02, 0.01, -0.004, 0.001");
+  write_file(file, "image_width: 640\nimage_height: 480\n" + four +
+                       pair.substr(pair.find("M2"), pair.find("D2") - pair.find("M2")));
+  EXPECT_THAT(lens_doubt(file + ":M1"), HasSubstr("k1 k2 k3 k4 of cv::fisheye"));
+  EXPECT_EQ(model_name(read_camera(file + ":M1:fisheye").lens), "kannala_brandt");
+  EXPECT_EQ(model_name(read_camera(file + ":M1:brown").lens), "brown");
+  EXPECT_THAT(fault_of([&] { (void)read_camera(file + ":M2"); }), HasSubstr("D2: is missing"));
+  write_file(file, "image_width: 640\nimage_height: 480\n" + pair);
   EXPECT_THAT(unread_parts(file + ":M1"), ::testing::ElementsAre(HasSubstr("M1 of 2 cameras")));
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "alidade/geometry/decompositions.h"
 
@@ -11,13 +12,15 @@ namespace {
 
 constexpr double spread = 0.004;  // of a match's misfit, half widths: lens and hand included
 constexpr double truncate_at = 9.0;
+constexpr double better = 0.99;  // of the cost
 
 /// A link's matches that agree, thinned.
 struct LinkPoints {
   std::vector<Eigen::Vector2d> a, b;
 };
 
-LinkPoints points_of(const MatchedPhotos& photos, const PhotoLink& link) {
+/// As pixels whose height is `aspect` times their width put them, were they square.
+LinkPoints points_of(const MatchedPhotos& photos, const PhotoLink& link, double aspect) {
   constexpr std::size_t max_points = 100;
   const PhotoScale scale(photos);
   const MatchedPair& pair = photos.pairs[link.pair];
@@ -26,7 +29,10 @@ LinkPoints points_of(const MatchedPhotos& photos, const PhotoLink& link) {
   for (std::size_t i = 0; i < link.inliers.size(); i += step) {
     const FeatureMatch& match = pair.matches[static_cast<std::size_t>(link.inliers[i])];
     const auto px = [&](int photo, int feature) {
-      return scale.normalised(photos.features[static_cast<std::size_t>(photo)][static_cast<std::size_t>(feature)]);
+      Eigen::Vector2d at =
+          scale.normalised(photos.features[static_cast<std::size_t>(photo)][static_cast<std::size_t>(feature)]);
+      at.y() /= aspect;
+      return at;
     };
     points.a.push_back(px(pair.photo_a, match.a));
     points.b.push_back(px(pair.photo_b, match.b));
@@ -66,15 +72,15 @@ Turn robust_turn(const LinkPoints& points, double focal) {
 
 }  // namespace
 
-std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
+std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links, double aspect,
                                      std::size_t most) {
   constexpr std::size_t max_links = 60;  // determine the focal length; the rotations come from all
   std::vector<LinkPoints> points;
-  for (const PhotoLink& link : links) points.push_back(points_of(photos, link));
+  for (const PhotoLink& link : links) points.push_back(points_of(photos, link, aspect));
   const std::size_t step = (links.size() + max_links - 1) / max_links;
   std::vector<FocalStart> tried;
   for (double focal = 0.25; focal < 60.0; focal *= 1.05) {
-    FocalStart start{focal, 0.0, {}};
+    FocalStart start{focal, aspect, 0.0, {}};
     for (std::size_t i = 0; i < links.size(); i += step) start.cost += robust_turn(points[i], focal).cost;
     tried.push_back(std::move(start));
   }
@@ -92,9 +98,33 @@ std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vec
   return minima;
 }
 
-double zoom_of(const PhotoLink& link, double focal) {
-  const Eigen::Matrix3d scaled = link.b_from_a * Eigen::Vector3d(focal, focal, 1.0).asDiagonal();
-  return 0.5 * (scaled.row(0).norm() + scaled.row(1).norm()) / (focal * scaled.row(2).norm());
+double likely_aspect(const MatchedPhotos& photos, const std::vector<PhotoLink>& links) {
+  constexpr std::size_t max_links = 20;
+  constexpr double most = 2.0, step = 1.06, focal_step = 1.15;
+  std::vector<const PhotoLink*> used;
+  for (std::size_t i = 0; i < links.size(); i += (links.size() + max_links - 1) / max_links) used.push_back(&links[i]);
+  const auto cost_of = [&](double aspect) {
+    std::vector<LinkPoints> points;
+    for (const PhotoLink* link : used) points.push_back(points_of(photos, *link, aspect));
+    double lowest = std::numeric_limits<double>::infinity();
+    for (double focal = 0.25; focal < 30.0; focal *= focal_step) {
+      double cost = 0.0;
+      for (const LinkPoints& each : points) cost += robust_turn(each, focal).cost;
+      lowest = std::min(lowest, cost / static_cast<double>(points.size()));
+    }
+    return lowest;
+  };
+  double best = 1.0, lowest = std::numeric_limits<double>::infinity();
+  for (double aspect = 1.0 / most; aspect < most; aspect *= step) {
+    const double cost = cost_of(aspect);
+    if (cost < lowest) std::tie(best, lowest) = std::pair(aspect, cost);
+  }
+  return lowest < better * cost_of(1.0) ? best : 1.0;
+}
+
+double zoom_of(const PhotoLink& link, double focal, double aspect) {
+  const Eigen::Matrix3d scaled = link.b_from_a * Eigen::Vector3d(focal, aspect * focal, 1.0).asDiagonal();
+  return 0.5 * (scaled.row(0).norm() + scaled.row(1).norm() / aspect) / (focal * scaled.row(2).norm());
 }
 
 }  // namespace alidade

@@ -21,11 +21,11 @@ double angle_of(const Eigen::Matrix3d& R) { return std::acos(std::clamp(0.5 * (R
 class TurnedRun {
  public:
   TurnedRun(const MatchedPhotos& photos, const TurnedConfig& config, const Progress& progress)
-      : photos_(photos), config_(config), free_(config), progress_(progress), scale_(photos) {
+      : photos_(photos), config_(config), free_(config), progress_(progress), scale_(photos_) {
     free_.ordinary_aspect |= config.square_pixels;
     free_.ordinary_centre |= config.fixed_centre;
     free_.square_pixels = free_.fixed_centre = false;
-    report_.photos.resize(photos.names.size());
+    report_.photos.resize(photos_.names.size());
     report_.camera.setZero();
     report_.cov.setZero();
     report_.cov_model.setZero();
@@ -72,29 +72,39 @@ class TurnedRun {
   }
 
   void fit() {
-    const std::vector<FocalStart> starts = focal_starts(photos_, links_);
-    std::vector<TurnedFit> fits;
-    constexpr double far_worse = 4.0;
-    for (const FocalStart& start : starts) {
-      if (start.cost > far_worse * starts.front().cost + 1.0) continue;
-      TurnedFit tried = fit_turned(photos_, links_, tree_, start, free_, false, progress_);
-      if (std::isfinite(tried.solution.cost) && freedom_of(tried.bundle) >= 1.0) fits.push_back(std::move(tried));
-    }
+    std::vector<FocalStart> starts = focal_starts(photos_, links_);
+    std::vector<TurnedFit> fits = fits_from(starts, photos_, links_, tree_, free_, progress_);
     num_agreeing_ = agreeing_matches(links_).size();
+    std::size_t best = best_of(fits);
+    if (try_other_aspect(fits, best)) starts = focal_starts(photos_, links_, free_.aspect);
     if (zooms_differ(starts)) return;
     if (fits.empty()) {
       report_.status = TurnedReport::Status::no_convergence;
       return;
     }
-    std::stable_sort(fits.begin(), fits.end(),
-                     [](const TurnedFit& a, const TurnedFit& b) { return a.num_kept > b.num_kept; });
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < fits.size(); ++i) {
-      const bool as_many = static_cast<double>(fits[i].num_kept) > 0.9 * static_cast<double>(fits[best].num_kept);
-      if (as_many && fits[i].solve.sigma_px < 0.9 * fits[best].solve.sigma_px) best = i;
-    }
     name_other_minimum(fits, best);
     fit_ = std::move(fits[best]);
+  }
+
+  /// Images that were squeezed, whose pixels no prior about one may hold: true where their fits are far better.
+  bool try_other_aspect(std::vector<TurnedFit>& fits, std::size_t& best) {
+    TurnedConfig config = free_;
+    config.aspect = likely_aspect(photos_, links_);
+    config.ordinary_aspect = false;
+    if (config.aspect == 1.0) return false;
+    const std::vector<FocalStart> starts = focal_starts(photos_, links_, config.aspect, 1);
+    std::vector<TurnedFit> others = fits_from(starts, photos_, links_, tree_, config, progress_);
+    TurnedConfig square = free_;
+    square.ordinary_aspect = true;
+    std::vector<TurnedFit> squares = fits;
+    if (!free_.ordinary_aspect)
+      squares = fits_from(focal_starts(photos_, links_, 1.0, 1), photos_, links_, tree_, square, progress_);
+    if (others.empty() || (!squares.empty() && !is_far_better(others.front(), squares[best_of(squares)]))) return false;
+    free_ = config;
+    free_.aspect = others.front().bundle.camera[1] / others.front().bundle.camera[0];
+    fits = std::move(others);
+    best = 0;
+    return true;
   }
 
   /// Another focal length that explains nearly as much nearly as well.

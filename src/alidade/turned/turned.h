@@ -16,6 +16,7 @@ struct TurnedConfig {
   bool fixed_centre = false;   ///< cx, cy: the initial guess's, else the image's centre.
   /// fx / fy and the centre are typical, within a σ that is included; false: nothing is known.
   bool ordinary_aspect = true, ordinary_centre = true;
+  double aspect = 1.0;                   ///< fy / fx of a typical camera; where it is free the initial guess.
   int lens_terms = 2;                    ///< Radial distortion that is fitted first: none, k1, k1 and k2, k3 as well.
   bool decentred = false;                ///< p1 and p2 as well.
   bool keeps_terms = false;              ///< Just these; false: of all terms those that differ significantly from zero.

@@ -47,7 +47,7 @@ void turn_by_tree(const std::vector<PhotoLink>& links, const PhotoTree& tree, co
     const Eigen::Matrix3d turn = is_b ? start.b_from_a[at] : Eigen::Matrix3d(start.b_from_a[at].transpose());
     bundle.cam_from_world[k] = turn * bundle.cam_from_world[from];
     if (!frees_zoom) continue;
-    const double zoom = std::log(std::clamp(zoom_of(link, start.focal), 0.1, 10.0));
+    const double zoom = std::log(std::clamp(zoom_of(link, start.focal, start.aspect), 0.1, 10.0));
     bundle.log_zoom[k] = bundle.log_zoom[from] + (is_b ? zoom : -zoom);
   }
 }
@@ -71,20 +71,21 @@ TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedC
   constexpr double ordinary_centre = 0.03, ordinary_aspect = 1e-3;  // half widths; share
   constexpr double corner_k1 = 0.08, corner_k2 = 0.04, corner_k3 = 0.02, ordinary_p = 1e-3;
   TurnedPrior prior;
-  prior.mean.head<2>().setConstant(focal);
+  const double fx = focal / (0.5 * (1.0 + config.aspect)), fy = config.aspect * fx;
+  prior.mean.head<2>() << fx, fy;
   if (config.start) {
     const PhotoScale scale(photos);
     const Eigen::Vector4d& k = *config.start;
     prior.mean.segment<2>(2) = scale.normalised(k.tail<2>());
   }
-  const double f2 = focal * focal, tall = static_cast<double>(photos.height_px) / photos.width_px;
-  const double corner = (1.0 + tall * tall) / f2;  // r² there
+  const double tall = static_cast<double>(photos.height_px) / photos.width_px;
+  const double corner = 1.0 / (fx * fx) + tall * tall / (fy * fy);  // r² there
   const double aspect = focal * (config.square_pixels ? exact : config.ordinary_aspect ? ordinary_aspect : free_aspect);
   const double centre = config.fixed_centre ? exact : config.ordinary_centre ? ordinary_centre : free_centre;
   const auto information = [](double sigma) { return 1.0 / (sigma * sigma); };
   TurnedInformation& Q = prior.information;
-  Q(0, 0) = Q(1, 1) = information(aspect);
-  Q(0, 1) = Q(1, 0) = -information(aspect);
+  const Eigen::Vector2d off(std::sqrt(config.aspect), -1.0 / std::sqrt(config.aspect));  // 0 along that aspect
+  Q.topLeftCorner<2, 2>() = information(aspect) * off * off.transpose();
   Q.topLeftCorner<2, 2>().array() += 0.25 * information(unknown_focal * focal);  // of (fx + fy) / 2
   Q(2, 2) = Q(3, 3) = information(centre);
   Q(4, 4) = information(config.lens_terms > 0 ? corner_k1 / corner : exact);
@@ -161,7 +162,7 @@ TurnedFit fit_turned(const MatchedPhotos& photos, const std::vector<PhotoLink>& 
                      const FocalStart& start, const TurnedConfig& config, bool frees_zoom, const Progress& progress) {
   TurnedFit fit;
   Rounds rounds(photos, config, frees_zoom, progress, fit);
-  rounds.prepare(start.focal);
+  rounds.prepare(0.5 * (1.0 + start.aspect) * start.focal);
   fit.bundle.camera = fit.prior.mean;
   turn_by_tree(links, tree, start, frees_zoom, fit.bundle);
   const std::vector<int> place = places_of(photos, tree);
@@ -173,6 +174,36 @@ TurnedFit fit_turned(const MatchedPhotos& photos, const std::vector<PhotoLink>& 
   }
   rounds.settle();
   return fit;
+}
+
+std::vector<TurnedFit> fits_from(const std::vector<FocalStart>& starts, const MatchedPhotos& photos,
+                                 const std::vector<PhotoLink>& links, const PhotoTree& tree, const TurnedConfig& config,
+                                 const Progress& progress) {
+  std::vector<TurnedFit> fits;
+  constexpr double far_worse = 4.0;
+  for (const FocalStart& start : starts) {
+    if (start.cost > far_worse * starts.front().cost + 1.0) continue;
+    TurnedFit tried = fit_turned(photos, links, tree, start, config, false, progress);
+    if (std::isfinite(tried.solution.cost) && freedom_of(tried.bundle) >= 1.0) fits.push_back(std::move(tried));
+  }
+  return fits;
+}
+
+std::size_t best_of(std::vector<TurnedFit>& fits) {
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const TurnedFit& a, const TurnedFit& b) { return a.num_kept > b.num_kept; });
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < fits.size(); ++i) {
+    const bool as_many = static_cast<double>(fits[i].num_kept) > 0.9 * static_cast<double>(fits[best].num_kept);
+    if (as_many && fits[i].solve.sigma_px < 0.9 * fits[best].solve.sigma_px) best = i;
+  }
+  return best;
+}
+
+bool is_far_better(const TurnedFit& fit, const TurnedFit& other) {
+  const double kept = static_cast<double>(fit.num_kept) / static_cast<double>(std::max<std::size_t>(other.num_kept, 1));
+  const double noise = fit.solve.sigma_px / other.solve.sigma_px;
+  return (kept > 0.9 && noise < 0.7) || (kept > 1.3 && noise < 1.0);
 }
 
 TurnedFit fit_again(const MatchedPhotos& photos, const PhotoTree& tree, TurnedFit fit, const TurnedConfig& config,

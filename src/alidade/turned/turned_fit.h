@@ -26,6 +26,17 @@ struct TurnedFit {
                                    const PhotoTree& tree, const FocalStart& start, const TurnedConfig& config,
                                    bool frees_zoom, const Progress& progress);
 
+/// From each start that is not far worse than the first; those that came to something.
+[[nodiscard]] std::vector<TurnedFit> fits_from(const std::vector<FocalStart>& starts, const MatchedPhotos& photos,
+                                               const std::vector<PhotoLink>& links, const PhotoTree& tree,
+                                               const TurnedConfig& config, const Progress& progress);
+
+/// Sorts the fits by the matches they keep, and says which explains most: nearly as many, with smaller residuals.
+[[nodiscard]] std::size_t best_of(std::vector<TurnedFit>& fits);
+
+/// Far better than `other`: pixels that are not square are too rare to be believed for less.
+[[nodiscard]] bool is_far_better(const TurnedFit& fit, const TurnedFit& other);
+
 /// The same photos with another config, from where the fit is.
 [[nodiscard]] TurnedFit fit_again(const MatchedPhotos& photos, const PhotoTree& tree, TurnedFit fit,
                                   const TurnedConfig& config, const Progress& progress);

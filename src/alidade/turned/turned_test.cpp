@@ -127,6 +127,27 @@ TEST(Turned, PixelsThatAreNotSquareAreNamed) {
   }
 }
 
+TEST(Turned, SqueezedImagesAreMeasuredAsTheyAreAndNamed) {
+  for (const double aspect : {0.75, 4.0 / 3.0}) {
+    TurnedScene scene = small_scene();
+    scene.fy = aspect * scene.fx;
+    scene.k1 = -0.05;
+    const MatchedPhotos photos = simulate_turned_photos(scene, 710);
+    TurnedConfig config = on_the_spot();
+    const TurnedReport report = observe_turned(photos, config);
+    ASSERT_EQ(report.status, Status::ok) << aspect;
+    EXPECT_LT(std::abs(report.camera[0] - scene.fx), 3.5 * std::sqrt(report.cov(0, 0))) << aspect;
+    EXPECT_LT(std::abs(report.camera[1] - scene.fy), 3.5 * std::sqrt(report.cov(1, 1))) << aspect;
+    const Verdict verdict = turned_verdict(report, photos, config);
+    EXPECT_EQ(verdict.state, State::care) << aspect;
+    EXPECT_THAT(verdict.to_add, HasSubstr("not square")) << aspect;
+    config.square_pixels = true;
+    EXPECT_THAT(turned_verdict(observe_turned(photos, config), photos, config).to_add,
+                HasSubstr("omit --square-pixels"))
+        << aspect;
+  }
+}
+
 TEST(Turned, ALeverOfMillimetresIsWithinSigmaAndOneOfDecimetresIsNamed) {
   TurnedScene scene = small_scene();
   scene.lever_m = {0.0, 0.0, 0.005};

@@ -66,6 +66,12 @@ Refusal weak(const TurnedReport& report, const MatchedPhotos& photos, const Turn
   constexpr double most = 0.05;
   const auto less = std::min(sigma[0], sigma[1]);
   const std::string turn = "rotate the camera farther, by half an image's width and more, up and down as well";
+  const double off_square = std::abs(report.free_aspect - 1.0);
+  if (config.square_pixels && off_square > 0.02 && off_square > 6.0 * report.sigma_free_aspect) {
+    return {
+        "the photos put fy / fx at " + text_of(report.free_aspect, 4) + ", far from the square pixels that are fixed",
+        "omit --square-pixels, or give the images as the camera took them"};
+  }
   if (!(less < most * f)) {
     return {"the focal length is determined to " + text_of(100.0 * less / f, 2) +
                 " % only (1σ), by rotations of up to " + text_of(report.largest_turn_rad / degree, 2) + "°",

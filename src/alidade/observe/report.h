@@ -88,9 +88,10 @@ struct ParallaxTest {
 
 /// Matches between photos.
 struct MatchCounts {
-  std::size_t given = 0;     ///< Between photos that take part.
-  std::size_t agreeing = 0;  ///< With one homography a pair.
-  std::size_t kept = 0;      ///< With one camera.
+  std::size_t given = 0;      ///< Between photos that take part.
+  std::size_t agreeing = 0;   ///< With one homography a pair.
+  std::size_t kept = 0;       ///< With one camera.
+  std::size_t burned_in = 0;  ///< Not among these: of what is at one place in the image, a date or a logo.
 };
 
 /// The result of observe() on a log or photos: what they determine, and how well. Where there is no

@@ -5,6 +5,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/turned/burned_in.h"
 #include "alidade/turned/parallax.h"
 #include "alidade/turned/photo_scatter.h"
 #include "alidade/turned/turned_fit.h"
@@ -20,8 +21,8 @@ double angle_of(const Eigen::Matrix3d& R) { return std::acos(std::clamp(0.5 * (R
 
 class TurnedRun {
  public:
-  TurnedRun(const MatchedPhotos& photos, const TurnedConfig& config, const Progress& progress)
-      : photos_(photos), config_(config), free_(config), progress_(progress), scale_(photos_) {
+  TurnedRun(MatchedPhotos photos, const TurnedConfig& config, const Progress& progress)
+      : photos_(std::move(photos)), config_(config), free_(config), progress_(progress), scale_(photos_) {
     free_.ordinary_aspect |= config.square_pixels;
     free_.ordinary_centre |= config.fixed_centre;
     free_.square_pixels = free_.fixed_centre = false;
@@ -33,6 +34,8 @@ class TurnedRun {
 
   TurnedReport run() {
     links_ = find_links(photos_, progress_);
+    report_.matches.burned_in = remove_burned_in(links_, photos_);
+    if (report_.matches.burned_in > 0) links_ = find_links(photos_, progress_);
     leave_out_same_images();
     tree_ = largest_tree(photos_.names.size(), links_);
     name_unconnected();
@@ -374,7 +377,7 @@ class TurnedRun {
     }
   }
 
-  const MatchedPhotos& photos_;
+  MatchedPhotos photos_;
   const TurnedConfig& config_;
   TurnedConfig free_;  ///< With fixed values free within typical priors: a fixed value may be wrong.
   const Progress& progress_;

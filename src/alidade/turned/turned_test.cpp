@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <random>
 
 #include "alidade/geometry/so3.h"
 #include "alidade/simulate/turned_scene.h"
@@ -146,6 +147,41 @@ TEST(Turned, SqueezedImagesAreMeasuredAsTheyAreAndNamed) {
                 HasSubstr("omit --square-pixels"))
         << aspect;
   }
+}
+
+/// A date in every photo, read as well as the scene and more often: `count` features at the same pixels.
+void burn_in(int count, MatchedPhotos& photos) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  std::vector<int> first;
+  for (auto& features : photos.features) {
+    first.push_back(static_cast<int>(features.size()));
+    for (int i = 0; i < count; ++i)
+      features.emplace_back(60.0 + 11.0 * (i % 30) + noise(random), 880.0 + 9.0 * (i / 30) + noise(random));
+  }
+  const int num_photos = static_cast<int>(photos.features.size());
+  for (int a = 0; a < num_photos; ++a) {
+    for (int b = a + 1; b < num_photos; ++b) {
+      auto pair = std::ranges::find_if(photos.pairs,
+                                       [&](const MatchedPair& each) { return each.photo_a == a && each.photo_b == b; });
+      if (pair == photos.pairs.end()) pair = photos.pairs.insert(pair, {a, b, {}});
+      for (int i = 0; i < count; ++i)
+        pair->matches.push_back({first[static_cast<std::size_t>(a)] + i, first[static_cast<std::size_t>(b)] + i});
+    }
+  }
+}
+
+TEST(Turned, WhatIsBurnedIntoTheImageIsLeftOut) {
+  const TurnedScene scene = small_scene();
+  MatchedPhotos photos = simulate_turned_photos(scene, 720);
+  burn_in(60, photos);
+  const TurnedConfig config = on_the_spot();
+  const TurnedReport report = observe_turned(photos, config);
+  ASSERT_EQ(report.status, Status::ok);
+  EXPECT_GT(report.matches.burned_in, 1200u);
+  EXPECT_LT(std::abs(report.camera[0] - scene.fx), 3.5 * std::sqrt(report.cov(0, 0)));
+  EXPECT_EQ(turned_verdict(report, photos, config).state, State::good);
+  EXPECT_EQ(observe_turned(simulate_turned_photos(scene, 720), config).matches.burned_in, 0u);
 }
 
 TEST(Turned, ALeverOfMillimetresIsWithinSigmaAndOneOfDecimetresIsNamed) {

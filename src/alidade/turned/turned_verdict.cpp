@@ -165,6 +165,9 @@ Check kept_check(const TurnedReport& report) {
   Check check{"matches", State::good, "", share, care, "%", "residuals"};
   check.text = "of " + std::to_string(report.matches.given) + " matches " + std::to_string(report.matches.agreeing) +
                " agree within their pair, " + std::to_string(report.matches.kept) + " with one camera that rotates";
+  if (report.matches.burned_in > 0)
+    check.text += "; " + std::to_string(report.matches.burned_in) +
+                  " more are of what is at one place in the image (a date, a logo, dirt on the lens), and are left out";
   if (share < care) check.state = State::care;
   return check;
 }

@@ -317,6 +317,11 @@ TEST_F(RangefinderCommand, WrongShotsAreNamed) {
     const bool is_outlier = std::ranges::count(made["estimate"]["outliers"], shots["name"][i]) > 0;
     EXPECT_EQ(shots["used"][i].get<bool>(), !is_outlier) << shots["name"][i] << shots["reason"][i];
   }
+  std::string named;  // as the table has them
+  for (std::size_t i = 0; i < 18; ++i)
+    if (!shots["used"][i].get<bool>()) named += (named.empty() ? "" : ", ") + shots["name"][i].get<std::string>();
+  EXPECT_NE(document["verdict"]["to_add"].get<std::string>().find("rejected: " + named), std::string::npos)
+      << document["verdict"]["to_add"] << named;
 }
 
 TEST_F(RangefinderCommand, SaysWhatIsWrongWithItsInput) {

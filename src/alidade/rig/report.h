@@ -17,6 +17,7 @@ ALIDADE_PUBLIC_BEGIN
 
 /// One view after the solve.
 struct HeadViewFit {
+  std::string name;  ///< As its table has it: "view 3", or its photo.
   bool used = false;
   std::string reason;      ///< Why it was not used; empty otherwise.
   std::string misreading;  ///< Of its row, with which it would fit: "fits board 3"; empty: none that was tried.

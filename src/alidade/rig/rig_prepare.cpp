@@ -119,6 +119,7 @@ void index_views(Work& work, const std::map<int, Camera>& cameras) {
   for (std::size_t v = 0; v < work.given.size(); ++v) {
     const HeadView& view = work.given[v];
     const bool has_camera = cameras.contains(view.head);
+    work.report.views[v].name = view.seen.photo.empty() ? "view " + std::to_string(v) : view.seen.photo;
     work.report.views[v].reason = view_fault(work, view);
     work.usable.push_back(has_camera && work.report.views[v].reason.empty());
     if (!has_camera) work.report.views[v].reason = "no camera of head " + std::to_string(view.head);

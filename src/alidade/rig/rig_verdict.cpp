@@ -3,6 +3,7 @@
 #include <string_view>
 #include <utility>
 
+#include "alidade/description/name_list.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/rig/rig.h"
 
@@ -175,19 +176,18 @@ void add_boards(const RigReport& report, Verdict& verdict) {
                                     least, 3.0, ""));
 }
 
-/// The rejected views by number, those together that would fit by the same change of their rows.
+/// The rejected views by name, those together that would fit by the same change of their rows.
 std::string rejected_views(const RigReport& report) {
-  std::vector<std::pair<std::string, std::string>> groups;  // change, views
-  for (std::size_t v = 0; v < report.views.size(); ++v) {
-    const HeadViewFit& fit = report.views[v];
+  std::vector<std::pair<std::string, std::vector<std::string>>> groups;  // change, views
+  for (const HeadViewFit& fit : report.views) {
     if (fit.used) continue;
-    auto group = std::ranges::find(groups, fit.misreading, &std::pair<std::string, std::string>::first);
-    if (group == groups.end()) group = groups.insert(group, {fit.misreading, ""});
-    group->second += (group->second.empty() ? "" : ", ") + std::to_string(v + 1);
+    auto group = std::ranges::find_if(groups, [&](const auto& one) { return one.first == fit.misreading; });
+    if (group == groups.end()) group = groups.insert(group, {fit.misreading, {}});
+    group->second.push_back(fit.name);
   }
   std::string text;
   for (const auto& [change, views] : groups)
-    text += (text.empty() ? "" : "; ") + views + (change.empty() ? "" : " (" + change + ")");
+    text += (text.empty() ? "" : "; ") + name_list(views) + (change.empty() ? "" : " (" + change + ")");
   return text;
 }
 
@@ -213,7 +213,7 @@ void add_fit(const RigReport& report, Verdict& verdict) {
   const auto given = static_cast<double>(report.views.size());
   const bool are_many = is_lost || static_cast<double>(outliers) > 0.4 * given;
   const State state = outliers == 0 ? State::good : are_many ? State::refused : State::care;
-  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all views agree" : "rejected: view " + named,
+  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all views agree" : "rejected: " + named,
                                     static_cast<double>(outliers), 0.4 * given, ""));
   if (report.dof < 1) return;
   const double ratio = report.chi2_per_dof(), most = 1.3 + 3.0 * std::sqrt(2.0 / report.dof);

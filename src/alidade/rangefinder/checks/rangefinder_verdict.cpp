@@ -3,6 +3,7 @@
 #include <optional>
 #include <string_view>
 
+#include "alidade/description/name_list.h"
 #include "alidade/rangefinder/checks/cause_checks.h"
 #include "alidade/rangefinder/checks/line_offset.h"
 
@@ -208,19 +209,20 @@ void add_boards(const RangefinderReport& report, std::span<const Shot> shots, Ve
                                     unfit, 0.0, "", "residuals"));
 }
 
-void add_fit(const RangefinderReport& report, Verdict& verdict) {
+void add_fit(const RangefinderReport& report, std::span<const Shot> shots, Verdict& verdict) {
   int outliers = 0;
-  std::string named;
+  std::vector<std::string> named;
   for (std::size_t i = 0; i < report.shots.size(); ++i) {
     if (report.shots[i].used || report.shots[i].reason.rfind("outlier", 0) != 0) continue;
-    named += (named.empty() ? "" : ", ") + std::to_string(i + 1);
+    named.push_back(i < shots.size() && !shots[i].name.empty() ? shots[i].name : "shot " + std::to_string(i + 1));
     ++outliers;
   }
   const int considered = report.shots_used + outliers;
   // Where two in five do not agree with the rest, the rest may be as wrong.
   const State state = outliers == 0 ? State::good : 5 * outliers > 2 * considered ? State::refused : State::care;
-  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all shots agree" : "rejected: shot " + named,
-                                    outliers, 0.4 * considered, "", "residuals"));
+  verdict.checks.push_back(check_of("outliers", state,
+                                    outliers == 0 ? "all shots agree" : "rejected: " + name_list(named), outliers,
+                                    0.4 * considered, "", "residuals"));
   if (report.dof < 1 || (report.spot_sigma_is_estimated && report.range_sigma_is_estimated)) return;
   const double ratio = std::sqrt(report.cost / report.dof);
   const double most = 1.0 + 3.0 / std::sqrt(2.0 * report.dof) + 0.2;
@@ -328,7 +330,7 @@ std::vector<Check> checks_of(const RangefinderReport& report, std::span<const Sh
   const Method method = method_by_shots(report, config.method);
   add_precision(report, method, verdict);
   add_geometry(report, shots, method, verdict);
-  add_fit(report, verdict);
+  add_fit(report, shots, verdict);
   add_clusters(report, verdict);
   if (config.method != Method::spot) add_boards(report, shots, verdict);
   add_spare(report, verdict);

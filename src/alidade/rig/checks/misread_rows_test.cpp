@@ -66,7 +66,31 @@ void expect_rows_named(const std::string& words, const Change& change) {
 }
 
 TEST(MisreadRows, SingleViewsOfTheOtherHeadAreNamed) {
-  expect_rows_named("rejected: view 6 (fits head ", [](std::vector<HeadView>& views) { exchange_head(views[5]); });
+  expect_rows_named("rejected: view 5 (fits head ", [](std::vector<HeadView>& views) { exchange_head(views[5]); });
+}
+
+TEST(MisreadRows, ViewsAreNamedAsTheTableHasThem) {
+  expect_rows_named("rejected: view 150 (fits head ", [](std::vector<HeadView>& views) {
+    for (std::size_t v = 0; v < views.size(); ++v) views[v].seen.photo = "view " + std::to_string(100 + 10 * v);
+    exchange_head(views[5]);
+  });
+  expect_rows_named("rejected: left.png (fits head ", [](std::vector<HeadView>& views) {
+    views[5].seen.photo = "left.png";
+    exchange_head(views[5]);
+  });
+}
+
+/// Blur spreads corners, and leaves the board where it is.
+TEST(MisreadRows, OfABoardWhereItShouldBeThePixelsAreNamed) {
+  RigSceneConfig config;
+  config.num_boards = 6;
+  const RigScene scene = draw_rig_scene(config, 1);
+  std::vector<HeadView> views = simulate_head_views(scene, {}, 1).views;
+  for (Corner& corner : views[5].seen.corners) corner.px.x() += corner.index % 2 == 0 ? 1.0 : -1.0;
+  const RigReport report = calibrate_rig(views, points_in_board(scene.board), testing::cameras_of(scene.rig), {});
+  EXPECT_FALSE(report.views[5].used);
+  EXPECT_TRUE(report.views[5].reason.starts_with("outlier: its corners are 1")) << report.views[5].reason;
+  EXPECT_EQ(report.views[5].reason.find("0.0° and 0 mm"), std::string::npos) << report.views[5].reason;
 }
 
 TEST(MisreadRows, ViewsOfAnotherBoardAreNamed) {

@@ -1,5 +1,6 @@
 #include "alidade/rig/checks/rejected_view.h"
 
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <vector>
@@ -90,6 +91,15 @@ class RowReadings {
   std::string best_;
 };
 
+/// The RMS distance of the view's corners from where the rig puts them, its reading corrected as in the solve.
+std::string corners_off(const Work& work, const RigState& state, std::size_t view) {
+  const auto at = view_residuals(work.problem, state, view);
+  if (!at) return "the rig does not put its corners into the image";
+  const Eigen::Index num = at->r.size() - 2;  // behind them, the reading's
+  const double rms_px = work.problem.sigma_px * std::sqrt(2.0 * at->r.head(num).squaredNorm() / double(num));
+  return "its corners are " + text_of(rms_px, 2) + " px from where the rig puts them";
+}
+
 }  // namespace
 
 Rejection rejection_of(const Work& work, const RigState& state, std::size_t view, double most) {
@@ -104,11 +114,14 @@ Rejection rejection_of(const Work& work, const RigState& state, std::size_t view
   const Rigid3& seen = work.poses[view]->pose.cam_from_board;
   const Rigid3 expected =
       cam_from_world(state.heads[own.head].head, work.given[view].pan_tilt_rad) * state.world_from_board[own.board];
-  char text[96];
-  std::snprintf(text, sizeof text, "outlier: the board is %.1f° and %.0f mm from where this head's angles put it",
-                expected.rotation.angularDistance(seen.rotation) / degree,
-                1e3 * (expected.translation - seen.translation).norm());
-  return {text, ""};
+  const double off_rad = expected.rotation.angularDistance(seen.rotation);
+  const double off_m = (expected.translation - seen.translation).norm();
+  std::string text = "outlier: " + corners_off(work, state, view);
+  if (off_rad < 0.05 * degree && off_m < 5e-4) return {text, ""};  // the board is where it should be
+  char board[96];
+  std::snprintf(board, sizeof board, "; the board is %.1f° and %.0f mm from where this head's angles put it",
+                off_rad / degree, 1e3 * off_m);
+  return {text + board, ""};
 }
 
 }  // namespace alidade

@@ -101,6 +101,7 @@ FollowConfig follow_config(const TrackConfig& config, const Rig& rig) {
   tracker.errors = rig_uncertainty(rig, config.sigma_clock_s.value_or(0.0));
   follow.predict_s = config.predict_s.value_or(0.0);
   follow.smooth_s = config.smooth_s.value_or(0.0);
+  follow.sigma_clock_s = config.sigma_clock_s.value_or(0.0);
   return follow;
 }
 

@@ -67,7 +67,8 @@ FieldList sigma_fields(TrackConfig& config) {
        .option = "--sigma-px"},
       {.name = "sigma_clock_s",
        .value = &config.sigma_clock_s,
-       .help = "σ of the delay between a head's clock and its images [s], counted in every σ (default: exact)",
+       .help = "σ of the delay between a head's clock and its images, and of its angles against these [s], counted in "
+               "every σ (default: exact)",
        .limits = positive},
       {.name = "sigma_angle_rad",
        .value = &config.sigma_angle_rad,

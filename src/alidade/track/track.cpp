@@ -10,6 +10,7 @@
 #include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/checks/time_jitter.h"
 #include "alidade/track/checks/time_steps.h"
+#include "alidade/track/checks/track_assumed.h"
 #include "alidade/track/white_noise.h"
 #include "alidade/track/xiahou_tracker.h"
 
@@ -206,12 +207,14 @@ Probable probable_sigma_a(std::span<const TargetObservation> sorted, std::span<c
 /// part is as large as the config's σ_px says, or larger than that of a target which is found.
 std::optional<double> sigma_px_by_white(std::span<const TargetObservation> sorted, std::span<const RigHead> heads,
                                         const FollowConfig& config, double compared_px, double& log_likelihood) {
-  constexpr double min_px = 0.2, max_px = 3.0, min_off = 3.0;  // what finders of targets reach, and what they need
+  constexpr double min_px = 0.2, max_px = 3.0;            // what finders of targets reach
+  constexpr double min_off = 3.0, min_off_smaller = 2.0;  // no fault of the rig makes noise look smaller
   constexpr int num_parts = 4;
   const auto first = first_of(sorted);
   const auto steps = followed(first, heads, config.tracker, config.progress).steps;
   const auto white = white_noise(first, heads, steps, compared_px, config.tracker.sigma_encoder_rad);
-  if (!white || !(std::abs(white->off_in_sigma) > min_off) || white->sigma_px > max_px) return std::nullopt;
+  if (!white || white->sigma_px > max_px) return std::nullopt;
+  if (!(white->off_in_sigma > min_off || white->off_in_sigma < -min_off_smaller)) return std::nullopt;
   // What is not white is in no difference: where they are small, there may be more.
   const double low_px = white->off_in_sigma < 0.0 ? white->sigma_px : white->low_px;
   std::optional<double> best;
@@ -348,6 +351,7 @@ TrackReport track_target(std::span<const TargetObservation> observations, std::s
     heed_faults(observations, heads, used, report);
     report.rounded = rounded_times(others, used, report);
     if (report.rounded) count_rounding(report.rounded->step_s, report);
+    if (config.sigma_clock_s > 0.0) count_angle_delay(others, heads, config.sigma_clock_s, report);
   } else {
     report.nis_per_dof = mean_nis(report.steps, counts, config.tracker.gate);
   }

@@ -22,10 +22,11 @@ struct FollowConfig {
   bool find_sigma_a = true;  ///< Take the σ_a that makes the innovations most probable, not the tracker's.
   /// Take the σ_px by the innovations where those are not what the tracker's explains; only where it is judged.
   bool find_sigma_px = true;
-  double predict_s = 0.0;  ///< Above 0: a prediction so far ahead of each step.
-  double smooth_s = 0.0;   ///< Above 0: also smoothed, with observations up to that much later; not for imm.
-  double warm_up_s = 0.5;  ///< After the start of a track: excluded from errors and statistics.
-  bool judge = true;       ///< Test the innovations, increase σ accordingly, and test for faults of the rig.
+  double predict_s = 0.0;      ///< Above 0: a prediction so far ahead of each step.
+  double smooth_s = 0.0;       ///< Above 0: also smoothed, with observations up to that much later; not for imm.
+  double sigma_clock_s = 0.0;  ///< Above 0: σ of a delay of all heads' angles, counted where it is judged.
+  double warm_up_s = 0.5;      ///< After the start of a track: excluded from errors and statistics.
+  bool judge = true;           ///< Test the innovations, increase σ accordingly, and test for faults of the rig.
   /// Rows that are not followed, one per observation; none: those that repeat, if it is judged.
   std::vector<bool> kept_out = {};
   Progress progress = {};  ///< Is called now and then, and may stop the work.

@@ -43,4 +43,33 @@ Lean worst_lean(const TrackReport& report, std::span<const RigHead> heads) {
   return worst;
 }
 
+Check nis_check(const TrackReport& report, bool is_stated) {
+  constexpr double good_nis_low = 0.6;
+  const double nis = report.nis_per_dof;
+  const bool is_smaller = nis < good_nis_low, is_supposed = is_smaller && !is_stated;
+  const std::string px = text_of(report.sigma_px, 2) + " px", of_it = " the " + px + " estimated from it";
+  const std::string stated = report.sigma_px_is_found ? of_it : " stated";
+  std::string text = "innovations as large as predicted";
+  if (nis > good_nis_high) {
+    text = "noise is larger than" + stated + ", or the rig is wrong";
+  } else if (is_supposed) {
+    text = "noise is smaller than the " + px + " supposed: σ is up to " + text_of(1.0 / std::sqrt(nis), 2) +
+           " times too wide; --sigma-px states it";
+  } else if (is_smaller) {
+    text = "noise is smaller than" + stated;
+  } else if (report.sigma_px_is_found) {
+    text += " with noise of " + px + ", which is estimated from them";
+  }
+  const bool is_good = nis <= good_nis_high && (!is_smaller || is_supposed);
+  return {"NIS",
+          is_good         ? State::good
+          : nis > max_nis ? State::bad
+                          : State::care,
+          text_of(nis, 3) + " per degree of freedom: " + text,
+          nis,
+          good_nis_high,
+          "1",
+          "track"};
+}
+
 }  // namespace alidade

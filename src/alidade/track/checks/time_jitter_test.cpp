@@ -13,13 +13,13 @@
 namespace alidade {
 namespace {
 
-struct Judged {
+struct JudgedTimes {
   TrackReport report;
   Verdict verdict;
 };
 
 /// Times that scatter by so much about the true ones.
-Judged judged(const TrackScene& scene, double jitter_s, std::uint64_t seed, const FollowConfig& config = {}) {
+JudgedTimes judged(const TrackScene& scene, double jitter_s, std::uint64_t seed, const FollowConfig& config = {}) {
   std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
   Draws draws(seed + 1000);
   for (TargetObservation& observation : observations) {
@@ -27,7 +27,7 @@ Judged judged(const TrackScene& scene, double jitter_s, std::uint64_t seed, cons
     observation.t_arrival_s = observation.t_capture_s;
   }
   std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
-  Judged result;
+  JudgedTimes result;
   result.report = track_target(observations, scene.heads, config);
   result.verdict = track_verdict(result.report, observations, scene.heads, config);
   return result;
@@ -38,7 +38,7 @@ TEST(TimeJitter, IsNamedWithItsSize) {
   constexpr double jitter_s = 0.01;
   for (const char* name : {"C", "G"}) {
     for (int seed = 1; seed <= testing::trials(3); ++seed) {
-      const Judged with = judged(*track_scenario(name), jitter_s, static_cast<std::uint64_t>(seed));
+      const JudgedTimes with = judged(*track_scenario(name), jitter_s, static_cast<std::uint64_t>(seed));
       ASSERT_TRUE(with.report.jitter.has_value()) << name << seed;
       EXPECT_NEAR(with.report.jitter->sigma_s, jitter_s, 0.5 * jitter_s) << name << seed;
       EXPECT_EQ(with.verdict.state, State::care) << with.verdict.sentence;

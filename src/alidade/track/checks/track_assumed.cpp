@@ -137,53 +137,6 @@ class Lister {
   std::vector<Eigen::MatrixXd> by_;
 };
 
-/// How fast a head's readings change about that time [rad/s], from the readings beside it.
-Eigen::Vector2d reading_rate(std::span<const TargetObservation> observations, std::size_t head, double t_s) {
-  const TargetObservation *before = nullptr, *after = nullptr;
-  for (const TargetObservation& each : observations) {
-    if (each.head != head) continue;
-    if (each.t_capture_s < t_s && (before == nullptr || each.t_capture_s > before->t_capture_s)) before = &each;
-    if (each.t_capture_s > t_s && (after == nullptr || each.t_capture_s < after->t_capture_s)) after = &each;
-  }
-  constexpr double near_s = 1.0;
-  if (before == nullptr || after == nullptr || after->t_capture_s - before->t_capture_s > near_s)
-    return Eigen::Vector2d::Zero();
-  return (after->pan_tilt_rad - before->pan_tilt_rad) / (after->t_capture_s - before->t_capture_s);
-}
-
-/// Angles that all heads read before their images are taken: the target is where the rays of these angles meet, a
-/// little in its past. As the heads follow it no observation shows that.
-std::optional<Assumption> angles_before_images(std::span<const TargetObservation> observations,
-                                               std::span<const RigHead> heads, const TrackReport& report) {
-  constexpr std::size_t max_steps = 40;
-  constexpr double ordinary_delay_s = 0.001;
-  Eigen::Vector3d moved2 = Eigen::Vector3d::Zero(), in_sigma2 = Eigen::Vector3d::Zero();
-  double num = 0.0;
-  for (std::size_t i = report.steps.size() / 10; i < report.steps.size(); i += 1 + report.steps.size() / max_steps) {
-    const TrackStep& step = report.steps[i];
-    if (!step.has_belief || !step.accepted) continue;
-    const auto readings = readings_at(observations, heads.size(), step.t_s);
-    const auto by = meeting_sensitivity(heads, readings, step.belief.x.head<3>(), step.belief.x.segment<3>(3));
-    Eigen::Vector3d moved = Eigen::Vector3d::Zero();
-    for (std::size_t h = 0; h < by.size(); ++h)
-      if (by[h].size() > 0)
-        moved += ordinary_delay_s * by[h].middleCols<2>(pan_zero_param) * reading_rate(observations, h, step.t_s);
-    moved2 += moved.cwiseAbs2();
-    in_sigma2 += moved.cwiseAbs2().cwiseQuotient(step.belief.P.diagonal().head<3>());
-    num += by.empty() ? 0.0 : 1.0;
-  }
-  if (!(num > 0.0)) return std::nullopt;
-  Eigen::Index worst = 0;
-  in_sigma2.maxCoeff(&worst);
-  return Assumption{.name = "angles (s)",
-                    .value = std::nan(""),
-                    .ordinary = ordinary_delay_s,
-                    .moves = std::sqrt(in_sigma2[worst] / num),
-                    .moved = coordinates[static_cast<std::size_t>(worst)],
-                    .moved_by = std::sqrt(moved2[worst] / num),
-                    .remedy = "read the angles when the images are taken, or interpolate them to these times"};
-}
-
 /// By how much a third more or less of acceleration moves the track: RMS over its steps, in σ of each.
 double moved_by_motion(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                        const FollowConfig& config, const TrackReport& report) {
@@ -249,37 +202,6 @@ Assumption times_late_alike(const TrackReport& report, double sigma_clock_s) {
               "much earlier, by " +
               text_of(1e3 * move.moved_m, 2) + " mm (" + text_of(move.moved_in_sigma, 2) + "σ) for each " +
               text_of(1e3 * move.step_s, 2) + " ms"};
-}
-
-/// The largest of the heads' mean spacings of rows [s].
-double row_spacing_s(std::span<const TargetObservation> observations, std::size_t num_heads) {
-  double largest_s = 0.0;
-  for (std::size_t h = 0; h < num_heads; ++h) {
-    double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s, num = 0.0;
-    for (const TargetObservation& each : observations) {
-      if (each.head != h) continue;
-      first_s = std::min(first_s, each.t_capture_s);
-      last_s = std::max(last_s, each.t_capture_s);
-      num += 1.0;
-    }
-    if (num > 1.0) largest_s = std::max(largest_s, (last_s - first_s) / (num - 1.0));
-  }
-  return largest_s;
-}
-
-/// What the commonest delay of angles does, those of the image before: one row, as no observation shows it where the
-/// heads follow the target.
-Assumption angles_late_alike(const Assumption& angles, double row_s) {
-  const double times = row_s / angles.ordinary;
-  return {.name = "angles.late_alike",
-          .value = 0.0,
-          .ordinary = row_s,
-          .moves = std::nan(""),
-          .moved =
-              "whether the angles of all heads were read when the images were taken no observations show as long "
-              "as the heads follow the target: angles of one row earlier (" +
-              text_of(1e3 * row_s, 2) + " ms) move it by " + text_of(1e3 * times * std::abs(angles.moved_by), 2) +
-              " mm (" + text_of(times * angles.moves, 2) + "σ) in " + angles.moved.substr(0, 1)};
 }
 
 }  // namespace
@@ -349,11 +271,8 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
   if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations say
   lister.assumed.push_back(std::move(motion));
-  if (auto row = angles_before_images(observations, rig.heads, report)) {
-    lister.assumed.push_back(*row);
-    if (const double row_s = row_spacing_s(observations, rig.heads.size()); row_s > 0.0 && row->moves > 0.0)
-      lister.assumed.push_back(angles_late_alike(*row, row_s));
-  }
+  for (Assumption& row : angles_assumed(observations, rig.heads, report, given.sigma_clock_s))
+    lister.assumed.push_back(std::move(row));
   if (auto row = times_not_tested(observations, report, given.sigma_clock_s)) lister.assumed.push_back(std::move(*row));
   if (median.step != nullptr) lister.assumed.push_back(times_late_alike(report, given.sigma_clock_s));
   if (auto row = not_tested(observations, rig, config, report)) lister.assumed.push_back(std::move(*row));

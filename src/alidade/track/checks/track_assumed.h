@@ -41,4 +41,13 @@ struct HeadReading {
                                                     const FollowConfig& config, const TrackReport& report,
                                                     const TrackGiven& given);
 
+/// What is supposed of when all heads' angles were read: by so much about their images [s]; 0: not given.
+[[nodiscard]] std::vector<Assumption> angles_assumed(std::span<const TargetObservation> observations,
+                                                     std::span<const RigHead> heads, const TrackReport& report,
+                                                     double sigma_s);
+
+/// Adds to every covariance what such a delay of all heads' angles would move the target by.
+void count_angle_delay(std::span<const TargetObservation> observations, std::span<const RigHead> heads, double sigma_s,
+                       TrackReport& report);
+
 }  // namespace alidade

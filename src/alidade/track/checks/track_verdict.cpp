@@ -23,7 +23,7 @@ namespace {
 constexpr double good_nees = 2.0, max_nees = 9.0;  // per degree of freedom, where the truth is given
 constexpr double good_nees_of_one = 3.8;           // where errors do not change along a track: 99 % of three components
 constexpr double care_rejected = 0.05, max_rejected = 0.2;
-constexpr double min_used_share = 0.7, max_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
+constexpr double min_used_share = 0.7;
 
 double used_share(const TrackReport& report) {
   return report.steps.empty() ? 0.0 : static_cast<double>(report.num_used) / static_cast<double>(report.steps.size());
@@ -95,24 +95,6 @@ void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdic
                                    std::sqrt(report.inflation), 1.0, "1"));
 }
 
-Check nis_check(const TrackReport& report) {
-  const double nis = report.nis_per_dof;
-  const bool is_good = nis >= good_nis_low && nis <= good_nis_high;
-  const std::string stated =
-      report.sigma_px_is_found ? "the " + text_of(report.sigma_px, 2) + " px estimated from it" : "stated";
-  const std::string text = nis > good_nis_high  ? "noise is larger than " + stated + ", or the rig is wrong"
-                           : nis < good_nis_low ? "noise is smaller than " + stated
-                           : report.sigma_px_is_found
-                               ? "innovations as large as predicted with noise of " + text_of(report.sigma_px, 2) +
-                                     " px, which is estimated from them"
-                               : "innovations as large as predicted";
-  return check("NIS",
-               is_good         ? State::good
-               : nis > max_nis ? State::bad
-                               : State::care,
-               text_of(nis, 3) + " per degree of freedom: " + text, nis, good_nis_high, "1");
-}
-
 /// Only who has the truth sees a wrong focal length: a head that follows keeps the target central.
 Check truth_check(const TrackReport& report) {
   const double nees = report.nees_per_dof, ratio = std::sqrt(nees);
@@ -124,8 +106,8 @@ Check truth_check(const TrackReport& report) {
                "the errors are " + text_of(ratio, 2) + " times their σ", ratio, std::sqrt(max_good), "σ");
 }
 
-void add_checks(const TrackReport& report, Verdict& verdict) {
-  if (std::isfinite(report.nis_per_dof)) verdict.checks.push_back(nis_check(report));
+void add_checks(const TrackReport& report, bool is_stated, Verdict& verdict) {
+  if (std::isfinite(report.nis_per_dof)) verdict.checks.push_back(nis_check(report, is_stated));
   if (std::isfinite(report.nees_per_dof)) verdict.checks.push_back(truth_check(report));
   const auto num_alone = static_cast<double>(count(report, TrackEvent::one_head));
   const double alone = num_alone / static_cast<double>(report.steps.size());
@@ -340,7 +322,7 @@ void set_frozen_remedy(const TrackReport& report, std::span<const RigHead> heads
 }
 
 Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation> observations,
-                   std::span<const RigHead> heads, const FollowConfig& config, std::size_t num_given) {
+                   std::span<const RigHead> heads, const FollowConfig& config, bool is_stated, std::size_t num_given) {
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
   if (const auto unit = units_of_heads_times(observations, heads, config)) return refused({unit->text, unit_remedy});
   Causes causes = causes_of(report, observations, heads, config);
@@ -361,7 +343,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
   if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
   if (causes.second) verdict.checks.push_back(*causes.second);
   if (causes.falls && !causes.jumps) verdict.checks.push_back(*causes.falls);
-  add_checks(report, verdict);
+  add_checks(report, is_stated, verdict);
   add_white(report, heads, verdict);
   put_likelier_first(verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
@@ -391,9 +373,11 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   FollowConfig used = config;
   used.find_sigma_px = false;
   if (report.sigma_px_is_found) used.tracker.sigma_px = report.sigma_px;
-  if (report.frozen.empty()) return verdict_of(report, observations, heads, used, report.steps.size());
+  const auto states_own = [](const TargetObservation& observation) { return observation.sigma_px > 0.0; };
+  const bool is_stated = !config.find_sigma_px || !config.find_sigma_a || std::ranges::any_of(observations, states_own);
+  if (report.frozen.empty()) return verdict_of(report, observations, heads, used, is_stated, report.steps.size());
   const Followed followed(report, observations);
-  return verdict_of(followed.report, followed.observations, heads, used, report.steps.size());
+  return verdict_of(followed.report, followed.observations, heads, used, is_stated, report.steps.size());
 }
 
 }  // namespace alidade

@@ -308,5 +308,26 @@ TEST_F(RigCommand, WrongUsageAndBadFilesAreNamed) {
   EXPECT_EQ(alidade({"project", "--rig", path("none.yaml"), "--pan", "0", "--tilt", "0"}).code, 3);
 }
 
+/// Head 1's rows again, as head 2's.
+TEST_F(RigCommand, OneHeadGivenAsTwoIsRefused) {
+  simulate({"--scenario", "one_head"});
+  std::string table = read_file(path("sim/views.csv")), again;
+  std::size_t at = table.find('\n') + 1;
+  while (at < table.size()) {
+    const std::size_t end = table.find('\n', at);
+    std::string row = table.substr(at, end + 1 - at);
+    const std::size_t head = row.find(',', row.find(',') + 1) + 1;
+    ASSERT_EQ(row[head], '1') << row;
+    row[head] = '2';
+    again += "9" + std::string(5 - row.find(','), '0') + row;
+    at = end + 1;
+  }
+  write_file(path("views.csv"), table + again);
+  const Outcome outcome = calibrate(path("views.csv"));
+  EXPECT_EQ(outcome.code, 3) << outcome.out;
+  EXPECT_THAT(outcome.err, ::testing::HasSubstr("digit for digit"));
+  EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+}
+
 }  // namespace
 }  // namespace alidade

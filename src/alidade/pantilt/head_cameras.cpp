@@ -2,11 +2,44 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "alidade/estimation/config_error.h"
 
 namespace alidade {
+namespace {
+
+bool are_same(const BoardView& a, const BoardView& b) {
+  return std::ranges::equal(a.corners, b.corners, [](const Corner& one, const Corner& other) {
+    return one.index == other.index && one.px == other.px;
+  });
+}
+
+/// One head's rows given as two heads': no two cameras see corners alike to the last digit.
+std::string same_rows_fault(std::span<const HeadView> views) {
+  constexpr int least = 3;
+  std::map<std::pair<double, double>, std::vector<const HeadView*>> by_corner;
+  std::map<std::pair<int, int>, int> num_same;
+  for (const HeadView& view : views) {
+    if (view.seen.corners.empty()) continue;
+    const Eigen::Vector2d& first = view.seen.corners.front().px;
+    auto& others = by_corner[{first.x(), first.y()}];
+    for (const HeadView* other : others) {
+      if (other->head == view.head || !are_same(other->seen, view.seen)) continue;
+      if (++num_same[std::minmax(other->head, view.head)] < least) continue;
+      return fmt::format(
+          "{}: has the corners of {} digit for digit, as others of heads {} and {}: are they one head's?",
+          view.seen.photo, other->seen.photo, other->head, view.head);
+    }
+    others.push_back(&view);
+  }
+  return "";
+}
+
+}  // namespace
 
 std::vector<int> heads_of(std::span<const HeadView> views) {
   std::set<int> ids;
@@ -52,7 +85,7 @@ std::string image_fault(std::span<const HeadView> views, const std::map<int, Cam
           view.seen.photo, px.x(), px.y(), view.head, camera.width_px, camera.height_px);
     }
   }
-  return "";
+  return same_rows_fault(views);
 }
 
 }  // namespace alidade

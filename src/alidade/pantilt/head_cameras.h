@@ -24,7 +24,8 @@ ALIDADE_PUBLIC_BEGIN
 /// Heads of which the cameras alone are known, in the order of their ids.
 [[nodiscard]] std::vector<RigHead> heads_with(const std::map<int, Camera>& cameras);
 
-/// Names the first corner that lies outside its camera's image, and so belongs to another. Empty where there is none.
+/// Names the first corner that lies outside its camera's image, and so belongs to another, or two heads that have the
+/// same corners. Empty where there is none.
 [[nodiscard]] std::string image_fault(std::span<const HeadView> views, const std::map<int, Camera>& cameras);
 
 ALIDADE_PUBLIC_END

@@ -22,6 +22,11 @@ void add_camera_input(Run& run, const std::filesystem::path& file) {
 void add_rig_input(Run& run, const std::filesystem::path& file) {
   run.add_input("rig", file);
   for (const std::filesystem::path& camera : camera_files_of_rig(file)) add_camera_input(run, camera);
+  for (const std::string& changed : changed_cameras_of_rig(file))
+    run.add_doubt(file.string() + ": " + changed,
+                  "calibrate the rig again with that camera (alidade rig); or, if it is meant, remove camera_values of "
+                  "that head from " +
+                      file.string());
 }
 
 Camera read_camera_input(Run& run, const std::filesystem::path& file) {

@@ -89,5 +89,19 @@ TEST_F(TrackGivenCommand, EstimatesTheNoiseThatIsNotGivenAndSaysSo) {
   EXPECT_EQ(sigma_of({}), std::pair(0.5, std::string("default")));
 }
 
+/// What is wrong with a rig and in no σ of it makes no good track; what its σ has does.
+TEST_F(TrackGivenCommand, TheCauseOfARigThatIsWrongIsPassedOn) {
+  simulate();
+  const std::string rig = read_file(path("sim/rig.yaml"));
+  write_file(path("sim/rig.yaml"), rig + "verdict: care\nverdict_sentence: \"± 9 mm\"\n");
+  EXPECT_THAT(track({}).out, ::testing::HasSubstr("● "));
+  write_file(path("sim/rig.yaml"),
+             rig + "verdict: care\nverdict_sentence: \"± 9 mm\"\nverdict_cause: \"head1.camera.cy is 230\"\n");
+  const testing::Outcome outcome = track({});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, ::testing::HasSubstr("rig.yaml says ◆: head1.camera.cy is 230"));
+  EXPECT_THAT(outcome.out, ::testing::Not(::testing::HasSubstr("● ")));
+}
+
 }  // namespace
 }  // namespace alidade

@@ -24,7 +24,7 @@ namespace alidade::detail {
 /// Shortest text that reads back as the same double, always with a point or an exponent.
 [[nodiscard]] std::string number_text(double value);
 /// Keys of what a run said of the answer that a file holds, beside those of the answer.
-inline constexpr std::array<const char*, 2> verdict_keys{"verdict", "verdict_sentence"};
+inline constexpr std::array<const char*, 3> verdict_keys{"verdict", "verdict_sentence", "verdict_cause"};
 
 /// One line of text as a YAML string in double quotes.
 [[nodiscard]] std::string quoted_text(const std::string& text);

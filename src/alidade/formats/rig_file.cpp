@@ -22,6 +22,12 @@ using detail::number_text;
 using detail::refuse;
 using detail::refuse_unknown_keys;
 
+/// The lens that a rig was calibrated with, beside the name of its file: that may become another's.
+std::string lens_numbers(const Camera& camera) {
+  const Eigen::VectorXd values = params(camera.lens);
+  return number_list({values.data(), values.data() + values.size()});
+}
+
 std::string vector_text(const Eigen::Vector3d& v) { return number_list({v.x(), v.y(), v.z()}); }
 
 std::string quaternion_text(const Eigen::Quaterniond& rotation) {
@@ -44,7 +50,7 @@ std::string head_text(const RigHead& rig_head, const EncoderError& error, const 
   std::string text = fmt::format("  - id: {}\n", head.id);
   text += camera_file.empty()
               ? "    camera:\n" + indented(camera_text(rig_head.camera, CameraFormat::alidade), "      ")
-              : fmt::format("    camera: {}\n", camera_file);
+              : fmt::format("    camera: {}\n    camera_values: {}\n", camera_file, lens_numbers(rig_head.camera));
   text += fmt::format("    world_from_base:\n      translation_m: {}\n      quaternion_wxyz: {}\n",
                       vector_text(head.world_from_base.translation), quaternion_text(head.world_from_base.rotation));
   text += fmt::format("    pan_to_tilt_m: {}\n    tilt_to_cam_m: {}\n", vector_text(head.pan_to_tilt_m),
@@ -190,8 +196,8 @@ Camera camera_of(const YAML::Node& node, const Fields& fields, const std::filesy
 RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem::path& file) {
   const Fields fields(node, file.string(), fmt::format("heads[{}].", index));
   refuse_unknown_keys(fields,
-                      {"id", "camera", "world_from_base", "pan_to_tilt_m", "tilt_to_cam_m", "cam_from_tilt",
-                       "axes_skew_rad", "encoder", "intrinsics"},
+                      {"id", "camera", "camera_values", "world_from_base", "pan_to_tilt_m", "tilt_to_cam_m",
+                       "cam_from_tilt", "axes_skew_rad", "encoder", "intrinsics"},
                       "a head");
   RigHead read;
   Head& head = read.head;
@@ -240,6 +246,25 @@ void read_rig_covariance(const YAML::Node& node, const Fields& fields, Rig& rig)
   if (!all.bottomRows(all.rows() - num).isZero(0.0)) rig.cov_with_lenses = all;
 }
 
+/// How a camera's file differs from the lens that the rig was calibrated with; empty where it is that.
+std::string lens_change(const Camera& camera, const std::vector<double>& calibrated) {
+  constexpr double as_written = 1e-6;
+  const std::vector<std::string> names = param_names(camera.lens);
+  const Eigen::VectorXd values = params(camera.lens);
+  if (static_cast<std::size_t>(values.size()) != calibrated.size())
+    return " is of another lens model than the one that the rig was calibrated with";
+  std::size_t most = 0;
+  double largest = 0.0;
+  for (std::size_t k = 0; k < calibrated.size(); ++k) {
+    const double off =
+        std::abs(values[static_cast<Eigen::Index>(k)] - calibrated[k]) / (1e-3 + std::abs(calibrated[k]));
+    if (off > largest) largest = off, most = k;
+  }
+  if (!(largest > as_written)) return "";
+  return fmt::format(" has {} {:.7g}, but the rig was calibrated with {:.7g}", names[most],
+                     values[static_cast<Eigen::Index>(most)], calibrated[most]);
+}
+
 }  // namespace
 
 std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) {
@@ -254,7 +279,9 @@ std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) 
 Rig read_rig(const std::filesystem::path& file) {
   const YAML::Node root = detail::load_yaml(read_file(file), file.string());
   const Fields fields(root, file.string());
-  refuse_unknown_keys(fields, {"heads", "covariance", detail::verdict_keys[0], detail::verdict_keys[1]}, "a rig");
+  refuse_unknown_keys(
+      fields, {"heads", "covariance", detail::verdict_keys[0], detail::verdict_keys[1], detail::verdict_keys[2]},
+      "a rig");
   const YAML::Node heads = root["heads"];
   if (!heads.IsDefined() || !heads.IsSequence() || heads.size() == 0)
     refuse(file.string(), "heads", "must be a list of at least one head");
@@ -281,6 +308,21 @@ std::vector<std::filesystem::path> camera_files_of_rig(const std::filesystem::pa
     if (camera.IsDefined() && camera.IsScalar()) files.push_back(file.parent_path() / camera.as<std::string>());
   }
   return files;
+}
+
+std::vector<std::string> changed_cameras_of_rig(const std::filesystem::path& file) {
+  const YAML::Node heads = detail::load_yaml(read_file(file), file.string())["heads"];
+  std::vector<std::string> changed;
+  for (std::size_t i = 0; heads.IsDefined() && heads.IsSequence() && i < heads.size(); ++i) {
+    if (!heads[i].IsMap() || !heads[i]["camera"] || !heads[i]["camera"].IsScalar()) continue;
+    const YAML::Node head = heads[i];
+    const Fields fields(head, file.string(), fmt::format("heads[{}].", i));
+    if (!fields.has("camera_values")) continue;
+    const Camera camera = read_central_camera(file.parent_path() / fields.text("camera"));
+    const std::string change = lens_change(camera, fields.numbers("camera_values"));
+    if (!change.empty()) changed.push_back(fields.text("camera") + change);
+  }
+  return changed;
 }
 
 std::map<int, Camera> read_cameras_by_head(const std::vector<std::filesystem::path>& files, const std::vector<int>& ids,

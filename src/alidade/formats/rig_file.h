@@ -24,6 +24,10 @@ ALIDADE_PUBLIC_BEGIN
 /// The camera files that it names, in the order of its heads; of what read_rig() refuses perhaps none.
 [[nodiscard]] std::vector<std::filesystem::path> camera_files_of_rig(const std::filesystem::path& file);
 
+/// Camera files that are not what the rig was calibrated with (`camera_values` of a head, where it is there), each with
+/// what differs: "camera_1.yaml has fx 905.1, but the rig was calibrated with 900.6".
+[[nodiscard]] std::vector<std::string> changed_cameras_of_rig(const std::filesystem::path& file);
+
 /// Reads the camera of each head of a table: one file for all, or one for each head in the order of `ids`. Throws
 /// InputError: another number of files (`table` is named), a camera that cannot be read or is not central.
 [[nodiscard]] std::map<int, Camera> read_cameras_by_head(const std::vector<std::filesystem::path>& files,

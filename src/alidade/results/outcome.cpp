@@ -8,8 +8,8 @@
 
 namespace alidade {
 
-void note_verdict(std::initializer_list<std::string_view> files, JobOutcome& outcome) {
-  const std::string note = file_verdict_text(outcome.document.verdict);
+void note_verdict(std::initializer_list<std::string_view> files, JobOutcome& outcome, const std::string& cause) {
+  const std::string note = file_verdict_text(outcome.document.verdict, cause);
   for (NamedBytes& file : outcome.files)
     if (std::ranges::count(files, file.name) > 0) file.bytes += note;
 }

@@ -26,8 +26,8 @@ struct JobOutcome {
   std::vector<NamedBytes> images;  ///< The most wanted first.
 };
 
-/// These files of the outcome say, where its verdict is not good, that it is not.
-void note_verdict(std::initializer_list<std::string_view> files, JobOutcome& outcome);
+/// These files of the outcome say, where its verdict is not good, that it is not, and what is in no σ of them.
+void note_verdict(std::initializer_list<std::string_view> files, JobOutcome& outcome, const std::string& cause = "");
 
 /// "KIND: WHAT", a line for each; of many the first ten, and how many more result.json names.
 void add_each(std::string_view kind, std::span<const std::string> each, std::vector<std::string>& lines);

@@ -239,6 +239,17 @@ void add_lines_of_head(const Rig& rig, std::size_t h, std::vector<std::string>& 
     if (scale < 0.0) lines.push_back(fmt::format("  its {} counts the other way: {}_scale {:.4g}", axis, axis, scale));
 }
 
+/// What the views indicate and no σ of the rig has: another lens, a drift, boards that were moved. Not scales of
+/// encoders, which are estimated, and right.
+std::string uncounted_cause(const Verdict& verdict) {
+  for (const Check& check : verdict.checks) {
+    const bool is_of_lens = check.name == "estimated" && check.text.find(lens_remedy) != std::string::npos;
+    if (check.state == State::care && (check.name == "causes" || is_of_lens))
+      return check.text.substr(0, check.text.find("; "));
+  }
+  return "";
+}
+
 std::vector<std::string> lines_of(const RigCalibration& result) {
   std::vector<std::string> no_boards, not_used, rejected;
   for (const SkippedInput& photo : result.no_board) no_boards.push_back(photo.file + ": " + photo.reason);
@@ -279,7 +290,7 @@ JobOutcome outcome_of(const RigCalibration& calibration) {
   fill_document(calibration, outcome.document);
   outcome.lines = lines_of(calibration);
   if (is_estimate(static_cast<int>(calibration.verdict.exit_code))) add_rig_files(calibration.rig, outcome.files);
-  note_verdict({"rig.yaml"}, outcome);
+  note_verdict({"rig.yaml"}, outcome, uncounted_cause(calibration.verdict));
   return outcome;
 }
 

@@ -53,6 +53,8 @@ struct HeadCover {
   int num_shared_boards = 0;  ///< Seen by another head, too.
 };
 
+/// What to do about a lens that is not its file's.
+inline constexpr const char* lens_remedy = "calibrate that lens again";
 /// Name of a cause: boards were moved between the views of one head and those of another.
 inline constexpr const char* moved_boards_name = "board positions";
 /// Its print is wider along its columns than along its rows, by a share; its points do not lie in a plane [m].

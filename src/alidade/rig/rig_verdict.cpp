@@ -296,7 +296,7 @@ void add_freed(const RigReport& report, Verdict& verdict) {
   if (worst != nullptr)
     text = worst->name + " is " + text_of(worst->value, 5) + ", not " + text_of(worst->was, 5) + " (" +
            text_of(most, 2) + "σ): " +
-           (worst->name.find("camera") != std::string::npos ? "calibrate that lens again"
+           (worst->name.find("camera") != std::string::npos ? lens_remedy
                                                             : "check the encoder, and the rig at other angles") +
            "; " + text;
   verdict.checks.push_back(

@@ -10,7 +10,7 @@ namespace {
 
 /// A match's misfit in photo b, and how a step of the camera along x, y, z would move the point there.
 struct Misfit {
-  Eigen::Vector2d residual;
+  Eigen::Vector2d px, residual;
   Eigen::Matrix<double, 2, 3> by_step;
 };
 
@@ -31,7 +31,7 @@ PairMisfits misfits_of(const TurnedFit& fit) {
       TurnedPrediction seen;
       const Eigen::Matrix3d b_from_a = turn_between(bundle, a, b);
       if (!predict_turned(bundle.camera, b_from_a, bundle.log_zoom[b], *ray, seen)) continue;
-      misfits[{from.photo, to.photo}].push_back({seen.px - to.px, seen.J_ray * b_from_a.transpose()});
+      misfits[{from.photo, to.photo}].push_back({to.px, seen.px - to.px, seen.J_ray * b_from_a.transpose()});
     }
   }
   return misfits;
@@ -66,15 +66,88 @@ Anisotropy along_lines(const std::vector<Misfit>& misfits, const Eigen::Vector3d
   return {sum / std::sqrt(0.5 * fourth), sum / static_cast<double>(misfits.size())};
 }
 
+/// A sum of products that are zero in the mean, in its σ by their squares.
+struct Products {
+  double sum = 0.0, squares = 0.0;
+  void add(double product) {
+    sum += product;
+    squares += product * product;
+  }
+  [[nodiscard]] double z() const { return squares > 0.0 ? sum / std::sqrt(squares) : 0.0; }
+};
+
+/// Do neighbours in a photo have misfits alike? Most are of one surface, thus at one distance; their noise is
+/// independent, whatever its direction, unless they are so close that they share their image.
+double of_neighbours(std::vector<Misfit> misfits) {
+  constexpr double closest = 0.025, farthest = 0.1;  // half widths
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Misfit& misfit : misfits) mean += misfit.residual / static_cast<double>(misfits.size());
+  std::ranges::sort(misfits, {}, [](const Misfit& misfit) { return misfit.px.x(); });
+  Products products;
+  for (auto a = misfits.begin(); a != misfits.end(); ++a) {
+    for (auto b = a + 1; b != misfits.end() && b->px.x() - a->px.x() < farthest; ++b) {
+      const double apart = (b->px - a->px).norm();
+      if (apart > closest && apart < farthest) products.add((a->residual - mean).dot(b->residual - mean));
+    }
+  }
+  return products.z();
+}
+
+/// How far each residual moves its ray in the world, least.
+Eigen::Matrix3Xd ray_shifts(const TurnedFit& fit) {
+  const TurnedBundle& bundle = fit.bundle;
+  Eigen::Matrix3Xd shifts = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(bundle.observations.size()));
+  for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
+    const TurnedDetection& seen = bundle.observations[i];
+    const auto k = static_cast<std::size_t>(seen.photo);
+    TurnedPrediction at;
+    if (!predict_turned(bundle.camera, bundle.cam_from_world[k], bundle.log_zoom[k],
+                        bundle.rays[static_cast<std::size_t>(seen.track)], at))
+      continue;
+    const Eigen::Matrix2d square = at.J_ray * at.J_ray.transpose();
+    shifts.col(static_cast<Eigen::Index>(i)) = at.J_ray.transpose() * (square.inverse() * (at.px - seen.px));
+  }
+  return shifts;
+}
+
+/// Do two pairs of photos that share none see a point's distance alike, by the lever between the camera's centre and
+/// that of its rotations? The noise of the pairs is independent, even of one point.
+double of_one_lever(const TurnedFit& fit) {
+  const std::vector<TurnedDetection>& seen = fit.bundle.observations;
+  const Eigen::Matrix3Xd shifts = ray_shifts(fit);
+  Products products;
+  for (std::size_t begin = 0, end = 0; begin < seen.size(); begin = end) {
+    while (end < seen.size() && seen[end].track == seen[begin].track) ++end;
+    if (end - begin < 4) continue;
+    // of the pairs' levers h: Σ h_p·h_q over those that share no photo, by what all sum to and what those of a photo do
+    Eigen::Matrix3Xd of_photo = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(end - begin));
+    double squares = 0.0;
+    for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t j = i + 1; j < end; ++j) {
+        const Eigen::Matrix3d turned = fit.bundle.cam_from_world[static_cast<std::size_t>(seen[j].photo)] -
+                                       fit.bundle.cam_from_world[static_cast<std::size_t>(seen[i].photo)];
+        const Eigen::Vector3d h =
+            turned * (shifts.col(static_cast<Eigen::Index>(j)) - shifts.col(static_cast<Eigen::Index>(i)));
+        of_photo.col(static_cast<Eigen::Index>(i - begin)) += h;
+        of_photo.col(static_cast<Eigen::Index>(j - begin)) += h;
+        squares += h.squaredNorm();
+      }
+    }
+    products.add((0.5 * of_photo.rowwise().sum()).squaredNorm() + squares - of_photo.squaredNorm());
+  }
+  return products.z();
+}
+
 }  // namespace
 
 ParallaxTest parallax_of(const TurnedFit& fit) {
   constexpr std::size_t min_matches = 20;
   const std::vector<Eigen::Vector3d> steps = directions();
   ParallaxTest test;
-  double squares = 0.0, turns = 0.0, count = 0.0;
+  double squares = 0.0, turns = 0.0, count = 0.0, agree = 0.0;
   for (const auto& [photos, misfits] : misfits_of(fit)) {
     if (misfits.size() < min_matches) continue;
+    agree = std::max(agree, of_neighbours(misfits));
     Anisotropy most;
     for (const Eigen::Vector3d& step : steps) {
       const Anisotropy each = along_lines(misfits, step);
@@ -95,6 +168,10 @@ ParallaxTest parallax_of(const TurnedFit& fit) {
     test.photo_b = photos.second;
   }
   if (!(count > 0.0)) return test;
+  // a match is sure across an edge and not along it: so is its noise, which nothing else agrees with
+  constexpr double surely = 3.3, surely_of_pairs = 4.5;  // of one test, of the pairs' largest
+  const double of_lever = of_one_lever(fit);
+  if (of_lever < surely && agree < surely_of_pairs) test.z = std::min(test.z, std::max(of_lever, agree));
   test.rms_px = std::sqrt(squares / count);  // normalised: the caller knows the scale
   const double focal = 0.5 * (fit.bundle.camera[0] + fit.bundle.camera[1]);
   // observable is the scatter of the points' inverse distances, typically half their mean; the mean looks like a

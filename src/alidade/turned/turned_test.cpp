@@ -205,6 +205,22 @@ TEST(Turned, ALeverOfMillimetresIsWithinSigmaAndOneOfDecimetresIsNamed) {
   }
 }
 
+/// Matches are sure across an edge and not along it: upright edges' noise lies along lines, as parallax does.
+TEST(Turned, NoiseAlongEdgesIsNoParallax) {
+  TurnedScene scene = small_scene();
+  scene.sigma_px = 0.1;
+  MatchedPhotos photos = simulate_turned_photos(scene, 730);
+  std::mt19937 random(730);
+  std::normal_distribution<double> along(0.0, 0.3);
+  for (auto& features : photos.features) {
+    for (Eigen::Vector2d& px : features) px.y() += along(random);
+  }
+  const TurnedReport report = observe_turned(photos, on_the_spot());
+  ASSERT_EQ(report.status, Status::ok);
+  EXPECT_LT(report.parallax.z, 6.0);
+  EXPECT_EQ(turned_verdict(report, photos, on_the_spot()).state, State::good);
+}
+
 TEST(Turned, APhotoThatWasZoomedIsRefusedByName) {
   TurnedScene scene = small_scene();
   scene.zoom = {1.0, 1.0, 1.0, 1.15};

@@ -4,6 +4,8 @@
 
 namespace alidade {
 
+inline constexpr double parallax_is_seen = 6.0;  ///< Of ParallaxTest::z: what is above is no noise.
+
 /// Do the residuals of a pair of photos lie along the lines to one point, as those of a camera whose centre moved?
 /// Summed over the matches, the square along such a line less the square across it is zero in the mean for noise of any
 /// size that knows no direction, and the parallax' square else; the point is the one of 200 directions that shows most.

@@ -307,7 +307,8 @@ class TurnedRun {
   void add_given() {
     const Eigen::Vector2d f = report_.camera.head<2>();
     const double estimated = std::max(report_.parallax.relative, ordinary_parallax);
-    const double parallax = config_.sigma_parallax ? *config_.sigma_parallax : estimated;
+    const double seen = report_.parallax.z < parallax_is_seen ? 0.0 : report_.parallax.relative;
+    const double parallax = config_.sigma_parallax ? std::max(*config_.sigma_parallax, seen) : estimated;
     TurnedCamera moves = TurnedCamera::Zero();
     moves.head<2>() = f;
     if (report_.lens_terms > 0) moves[4] = 0.5;

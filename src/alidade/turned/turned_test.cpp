@@ -184,6 +184,21 @@ TEST(Turned, WhatIsBurnedIntoTheImageIsLeftOut) {
   EXPECT_EQ(observe_turned(simulate_turned_photos(scene, 720), config).matches.burned_in, 0u);
 }
 
+TEST(Turned, ALeverThatIsSeenIsCountedThoughNoneIsGiven) {
+  TurnedScene scene = small_scene();
+  scene.num_photos = 5;
+  scene.points_per_rad2 = 600.0;
+  scene.lever_m = {0.0, 0.0, 0.2};
+  const TurnedConfig config = on_the_spot();
+  for (std::uint64_t seed = 2; seed < 4; ++seed) {
+    const MatchedPhotos photos = simulate_turned_photos(scene, seed);
+    const TurnedReport report = observe_turned(photos, config);
+    ASSERT_EQ(report.status, Status::ok);
+    EXPECT_LT(std::abs(report.camera[0] - scene.fx), 3.0 * std::sqrt(report.cov(0, 0)));
+    EXPECT_THAT(turned_verdict(report, photos, config).to_add, HasSubstr("counted in σ"));
+  }
+}
+
 TEST(Turned, ALeverOfMillimetresIsWithinSigmaAndOneOfDecimetresIsNamed) {
   TurnedScene scene = small_scene();
   scene.lever_m = {0.0, 0.0, 0.005};

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/turned/parallax.h"
 #include "alidade/turned/turned.h"
 
 namespace alidade {
@@ -11,7 +12,7 @@ namespace {
 
 using Status = TurnedReport::Status;
 
-constexpr double parallax_is_seen = 6.0, zoom_is_seen = 5.0, zoom_matters = 0.005;  // σ, σ, share
+constexpr double zoom_is_seen = 5.0, zoom_matters = 0.005;  // σ, share
 
 /// Some of the names: "a.jpg, b.jpg and 3 more".
 std::string list_of(const std::vector<std::string>& names) {

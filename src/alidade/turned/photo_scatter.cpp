@@ -65,4 +65,15 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
   return scatter;
 }
 
+double three_sigma_of(int term, const ScatterCovariance& scatter) {
+  const double share = 1.0 - std::min(scatter.cov_model(term, term) / scatter.cov(term, term), 1.0);
+  const double nu = std::max(scatter.degrees_of_freedom, 4.0) / std::max(share * share, 1e-6);
+  const double t = 3.0 + 7.5 / nu + 17.25 / (nu * nu) + 30.2 / (nu * nu * nu);
+  return t * std::sqrt((nu - 2.0) / nu);
+}
+
+bool is_nearly_zero(int term, const TurnedFit& fit, const ScatterCovariance& scatter) {
+  return std::abs(fit.bundle.camera[term]) <= three_sigma_of(term, scatter) * std::sqrt(scatter.cov(term, term));
+}
+
 }  // namespace alidade

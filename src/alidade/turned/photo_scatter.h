@@ -20,4 +20,11 @@ struct ScatterCovariance {
 /// ratio for all, and widened by ν/(ν − 2). docs/maths/turned-photos.md.
 [[nodiscard]] ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progress = {});
 
+/// As unlikely as 3 σ are, in the σ of a term of the camera: the part that a few photos' scatter told has Student's
+/// tails (Abramowitz & Stegun 26.7.5), ν by Satterthwaite.
+[[nodiscard]] double three_sigma_of(int term, const ScatterCovariance& scatter);
+
+/// Within that of zero.
+[[nodiscard]] bool is_nearly_zero(int term, const TurnedFit& fit, const ScatterCovariance& scatter);
+
 }  // namespace alidade

@@ -221,18 +221,19 @@ class TurnedRun {
   /// With the terms of the lens that differ significantly from zero; the others' uncertainty is still included.
   void state_covariance() {
     if (!config_.keeps_terms) {
-      free_.lens_terms = static_cast<int>(radial_places.size());
+      free_.lens_terms = num_radial;
       free_.decentred = true;
       fit_ = fit_again(photos_, tree_, std::move(fit_), free_, progress_);
     }
     ScatterCovariance scatter = scatter_covariance(fit_, progress_);
     if (!config_.keeps_terms) {
-      const bool drops_k3 = is_nearly_zero(radial_places[2], scatter), drops_p = !is_decentred(scatter);
+      const bool drops_k3 = is_nearly_zero(radial_places[2], fit_, scatter), drops_p = !is_decentred(scatter);
       if (drops_k3 || drops_p) drop(drops_k3 ? 2 : 3, !drops_p, scatter);
       while (free_.lens_terms > 0 &&
-             is_nearly_zero(radial_places[static_cast<std::size_t>(free_.lens_terms - 1)], scatter))
+             is_nearly_zero(radial_places[static_cast<std::size_t>(free_.lens_terms - 1)], fit_, scatter))
         drop(free_.lens_terms - 1, free_.decentred, scatter);
     }
+    if (!config_.keeps_terms && free_.lens_terms == num_radial) test_further_term();
     scatter.cov += by_lens_;
     report_.lens_terms = free_.lens_terms;
     report_.decentred = free_.decentred;
@@ -250,19 +251,6 @@ class TurnedRun {
     report_.cov_model = unit.asDiagonal() * scatter.cov_model * unit.asDiagonal();
     report_.cov = unit.asDiagonal() * scatter.cov * unit.asDiagonal();
     add_given();
-  }
-
-  [[nodiscard]] bool is_nearly_zero(int term, const ScatterCovariance& scatter) const {
-    return std::abs(fit_.bundle.camera[term]) <= three_sigma_of(term, scatter) * std::sqrt(scatter.cov(term, term));
-  }
-
-  /// As unlikely as 3 σ are, in the σ of a term: the part that a few photos' scatter told has Student's tails
-  /// (Abramowitz & Stegun 26.7.5), ν by Satterthwaite.
-  [[nodiscard]] static double three_sigma_of(int term, const ScatterCovariance& scatter) {
-    const double share = 1.0 - std::min(scatter.cov_model(term, term) / scatter.cov(term, term), 1.0);
-    const double nu = std::max(scatter.degrees_of_freedom, 4.0) / std::max(share * share, 1e-6);
-    const double t = 3.0 + 7.5 / nu + 17.25 / (nu * nu) + 30.2 / (nu * nu * nu);
-    return t * std::sqrt((nu - 2.0) / nu);
   }
 
   /// Significantly, and by no more than lenses are: what moves, or zooms, may look like a lens that no one makes.
@@ -290,6 +278,18 @@ class TurnedRun {
     moved += fit_.bundle.camera;
     by_lens_ += moved * moved.transpose();
     scatter = scatter_covariance(fit_, progress_);
+  }
+
+  /// Would k4 be needed as well? Then k1 to k3 do not describe the lens, and how it changes the answer is counted.
+  void test_further_term() {
+    TurnedConfig further = free_;
+    ++further.lens_terms;
+    const TurnedFit bent = fit_again(photos_, tree_, fit_, further, progress_);
+    if (is_nearly_zero(radial_places[num_radial], bent, scatter_covariance(bent, progress_))) return;
+    TurnedCamera moved = bent.bundle.camera - fit_.bundle.camera;
+    moved[radial_places[num_radial]] = 0.0;
+    by_lens_ += moved * moved.transpose();
+    report_.lens_departs = moved[0] / fit_.bundle.camera[0];
   }
 
   /// The camera in pixels; what a normalised unit of each parameter is.

@@ -46,6 +46,7 @@ struct TurnedReport {
   /// Terms of the lens that are estimated; the uncertainty of the others is included in `cov`.
   int lens_terms = 0;
   bool decentred = false;
+  double lens_departs = 0.0;  ///< Change of fx, a share, with the k4 that these do not describe; 0: they do.
   double sigma_px = 0.0;
   MatchCounts matches;
   double design_effect = 1.0;  ///< What photos change, over what the model expects of it; variances.

@@ -69,7 +69,7 @@ double freedom_of(const TurnedBundle& bundle) {
 TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedConfig& config) {
   constexpr double exact = 1e-7, unknown_focal = 5.0, free_centre = 0.5, free_aspect = 0.5;
   constexpr double ordinary_centre = 0.03, ordinary_aspect = 1e-3;  // half widths; share
-  constexpr double corner_k1 = 0.08, corner_k2 = 0.04, corner_k3 = 0.02, ordinary_p = 1e-3;
+  constexpr double corner_k1 = 0.08, corner_k2 = 0.04, corner_k3 = 0.02, corner_k4 = 0.01, ordinary_p = 1e-3;
   TurnedPrior prior;
   const double fx = focal / (0.5 * (1.0 + config.aspect)), fy = config.aspect * fx;
   prior.mean.head<2>() << fx, fy;
@@ -92,6 +92,7 @@ TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedC
   Q(5, 5) = information(config.lens_terms > 1 ? corner_k2 / (corner * corner) : exact);
   Q(6, 6) = Q(7, 7) = information(config.decentred ? ordinary_p : exact);
   Q(8, 8) = information(config.lens_terms > 2 ? corner_k3 / (corner * corner * corner) : exact);
+  Q(9, 9) = information(config.lens_terms > 3 ? corner_k4 / std::pow(corner, 4) : exact);
   return prior;
 }
 

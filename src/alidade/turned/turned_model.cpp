@@ -15,9 +15,9 @@ struct RadialFactor {
 };
 
 RadialFactor radial_factor(const TurnedCamera& camera, double r2) {
-  const double k1 = camera[4], k2 = camera[5], k3 = camera[8];
-  return {1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3),
-          1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + 7.0 * r2 * k3))};
+  const double k1 = camera[4], k2 = camera[5], k3 = camera[8], k4 = camera[9];
+  return {1.0 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4))), k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3 + 4.0 * r2 * k4)),
+          1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * (7.0 * k3 + 9.0 * r2 * k4)))};
 }
 
 /// By p1 and p2: what they add to a point of the image plane at focal length 1.
@@ -77,6 +77,7 @@ bool predict_turned(const TurnedCamera& camera, const Eigen::Matrix3d& R, double
   out.J_camera.col(5) = straight * r2 * r2;
   out.J_camera.middleCols<2>(6) = f.asDiagonal() * decentring(x);
   out.J_camera.col(8) = straight * r2 * r2 * r2;
+  out.J_camera.col(9) = straight * r2 * r2 * r2 * r2;
   const Eigen::Matrix2d J_px_x = f.asDiagonal() * bent.by_x;
   Eigen::Matrix<double, 2, 3> J_x_Y;
   J_x_Y << inverse, 0.0, -x.x() * inverse, 0.0, inverse, -x.y() * inverse;

@@ -6,13 +6,15 @@
 
 namespace alidade {
 
-inline constexpr int num_camera = 9, per_photo = 4;  ///< A photo's: its rotation (3), the log of its zoom.
+inline constexpr int num_camera = 10, per_photo = 4;  ///< A photo's: its rotation (3), the log of its zoom.
 
-/// fx, fy, cx, cy, k1, k2, p1, p2, k3. Pixels are normalised, (px − centre) / half width, and so are the first four.
+/// fx, fy, cx, cy, k1, k2, p1, p2, k3, k4. Pixels are normalised, (px − centre) / half width, and so are the first
+/// four.
 using TurnedCamera = Eigen::Matrix<double, num_camera, 1>;
 using TurnedInformation = Eigen::Matrix<double, num_camera, num_camera>;
-inline constexpr std::array<int, 3> radial_places{4, 5, 8};  ///< Of k1, k2, k3 in it.
-inline constexpr int decentring_place = 6;                   ///< Of p1, before p2.
+inline constexpr std::array<int, 4> radial_places{4, 5, 8, 9};  ///< Of k1 to k4 in it.
+inline constexpr int num_radial = 3;                            ///< That are estimated: k4 is only tested.
+inline constexpr int decentring_place = 6;                      ///< Of p1, before p2.
 
 /// Pixel of a far point with its derivatives.
 struct TurnedPrediction {
@@ -23,8 +25,8 @@ struct TurnedPrediction {
 };
 
 /// Normalised pixel of the direction `ray`, camera_from_world Y = R ray: u = fx e^z (x d + 2 p1 x y +
-/// p2 (r² + 2 x²)) + cx with x = Y₀/Y₂ and d = 1 + k1 r² + k2 r⁴ + k3 r⁶ (Brown 1971). None behind the camera, or
-/// beyond the fold of the lens.
+/// p2 (r² + 2 x²)) + cx with x = Y₀/Y₂ and d = 1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸ (Brown 1971). None behind the camera,
+/// or beyond the fold of the lens.
 [[nodiscard]] std::optional<Eigen::Vector2d> turned_pixel(const TurnedCamera& camera, const Eigen::Matrix3d& R,
                                                           double log_zoom, const Eigen::Vector3d& ray);
 [[nodiscard]] bool predict_turned(const TurnedCamera& camera, const Eigen::Matrix3d& R, double log_zoom,

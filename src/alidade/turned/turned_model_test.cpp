@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-const TurnedCamera bent = (TurnedCamera() << 1.6, 1.58, 0.02, -0.03, -0.2, 0.05, 0.01, -0.02, 0.03).finished();
+const TurnedCamera bent = (TurnedCamera() << 1.6, 1.58, 0.02, -0.03, -0.2, 0.05, 0.01, -0.02, 0.03, -0.01).finished();
 const Eigen::Matrix3d turned = exp_so3({0.1, -0.2, 0.05}).toRotationMatrix();
 const Eigen::Vector3d ray = Eigen::Vector3d(0.3, 0.1, 1.0).normalized();
 

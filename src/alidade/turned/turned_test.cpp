@@ -112,6 +112,33 @@ TEST(Turned, TheRestOfTheLensIsEstimatedOrCounted) {
   EXPECT_EQ(bent.others_within_3, few);
 }
 
+/// The same photos through an equidistant fisheye of `focal`.
+void view_through_fisheye(const TurnedScene& scene, double focal, MatchedPhotos& photos) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> noise(0.0, 0.2);
+  const Eigen::Vector2d centre(scene.cx, scene.cy);
+  for (auto& features : photos.features) {
+    for (Eigen::Vector2d& px : features) {
+      const Eigen::Vector2d x = (px - centre) / scene.fx;
+      px = centre + focal * std::atan(x.norm()) * x.normalized() + Eigen::Vector2d(noise(random), noise(random));
+    }
+  }
+}
+
+TEST(Turned, AFisheyeThatTheModelDoesNotDescribeIsNamedAndCounted) {
+  TurnedScene scene = small_scene();
+  scene.fx = scene.fy = 480.0;
+  scene.sigma_px = 0.0;
+  constexpr double focal = 690.0;
+  MatchedPhotos photos = simulate_turned_photos(scene, 610);
+  view_through_fisheye(scene, focal, photos);
+  const TurnedReport report = observe_turned(photos, on_the_spot());
+  ASSERT_EQ(report.status, Status::ok);
+  EXPECT_LT(std::abs(report.camera[0] - focal), 3.0 * std::sqrt(report.cov(0, 0)));
+  EXPECT_LT(std::abs(report.camera[1] - focal), 3.0 * std::sqrt(report.cov(1, 1)));
+  EXPECT_THAT(turned_verdict(report, photos, on_the_spot()).to_add, HasSubstr("fisheye"));
+}
+
 TEST(Turned, PixelsThatAreNotSquareAreNamed) {
   for (const bool fixes : {true, false}) {
     TurnedScene scene = small_scene();

@@ -245,6 +245,19 @@ Check aspect_check(const TurnedReport& report, const TurnedConfig& config) {
   return check;
 }
 
+Check lens_check(const TurnedReport& report) {
+  const double percent = 100.0 * std::abs(report.lens_departs);
+  Check check{"lens", State::good, "", percent, 0.0, "%", "intrinsics"};
+  check.text = "no radial term is needed beyond those that are estimated";
+  if (percent > 0.0) {
+    check.state = State::care;
+    check.text = "the lens departs from its model, k1, k2 and k3 (a fisheye?): one term more changes fx by " +
+                 text_of(percent, 2) +
+                 " %; counted in σ: calibrate it on a board, with calibrate --model kannala_brandt";
+  }
+  return check;
+}
+
 /// Why there is no estimate, in a verdict; none where there is one.
 std::optional<Verdict> refusal_of(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
   switch (report.status) {
@@ -285,6 +298,7 @@ Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, 
                     parallax_check(report, photos),
                     zoom_check(report, photos),
                     noise_check_of(report, photos),
+                    lens_check(report),
                     minimum_check(report)};
   verdict.checks.insert(verdict.checks.begin(), aspect_check(report, config));
   if (config.fixed_centre) verdict.checks.insert(verdict.checks.begin(), centre_check(report));

@@ -175,150 +175,6 @@ void ObservationLocalizer::place_by_target(const ObservationFrame& frame) {
   if (!from.empty()) engine_.filters().restart(from);
 }
 
-/// χ² of six components.
-double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const {
-  const LocalizationFilter& now = engine_.best();
-  const CameraMotion& is = now.motion();
-  Eigen::Vector<double, 6> difference;
-  difference.head<3>() = from.motion.world_from_cam.translation - is.world_from_cam.translation;
-  difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.motion.world_from_cam.rotation);
-  const Eigen::Matrix<double, 6, 6> cov =
-      now.motion_covariance().topLeftCorner<6, 6>() + from.cov.topLeftCorner<6, 6>();
-  return squared_mahalanobis(difference, cov);
-}
-
-constexpr double max_contradiction = 22.5;  // χ² of six components: 99.9 %
-
-/// Where the camera is by the target, if that contradicts the path. Empty: it does not, or its observations fit no
-/// pose.
-std::vector<StartHypothesis> ObservationLocalizer::elsewhere(const ObservationFrame& frame) const {
-  std::vector<StartHypothesis> from =
-      poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config());
-  if (!from.empty() && contradiction_of(from.front()) < max_contradiction) from.clear();
-  return from;
-}
-
-/// Of the target's observations, how many more a pose explains than the path does.
-int ObservationLocalizer::num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const {
-  const double gate_px2 = 4.0 * config_.filter.gate * config_.filter.sigma_px * config_.filter.sigma_px;
-  const Rigid3& now = engine_.best().motion().world_from_cam;
-  int num_more = 0;
-  for (const FeatureObservation& observation : frame.observations) {
-    const auto known = std::ranges::find(config_.target.points, observation.id, &KnownPoint::id);
-    if (known == config_.target.points.end()) continue;
-    const auto is_near = [&](const Rigid3& pose) {
-      const auto px = project(engine_.camera(), pose.inverse() * known->point_in_world);
-      return px && (*px - observation.px).squaredNorm() < gate_px2 ? 1 : 0;
-    };
-    num_more += is_near(world_from_cam) - is_near(now);
-  }
-  return num_more;
-}
-
-/// All but the target.
-void ObservationLocalizer::drop_map() {
-  std::vector<long> unknown;
-  for (const Feature& feature : engine_.best().features())
-    if (!feature.is_known) unknown.push_back(feature.id);
-  for (const long id : unknown) engine_.filters().remove(id);
-  points_.forget_gone();
-}
-
-/// From the target, where it says that the camera is somewhere else. Mismatches may look like another pose: where the
-/// observations that fit are not contradicted by themselves, it has to explain at least two more of the target's, and
-/// where there is only some doubt three times running. The map of points that led there is dropped.
-bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
-  constexpr int sure = 3, min_more = 2;
-  std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);
-  if (!from.empty() && doubt != Doubt::strong &&
-      num_more_explained(frame, from.front().motion.world_from_cam) < min_more)
-    from.clear();
-  num_elsewhere_ = from.empty() ? 0 : num_elsewhere_ + 1;
-  if (from.empty() || (doubt == Doubt::some && num_elsewhere_ < sure)) return false;
-  drop_map();
-  engine_.filters().restart(only_where(from));
-  record_.begin(num_taken_);
-  engine_.forget_doubt();
-  num_elsewhere_ = 0;
-  engine_.count_restart();
-  return true;
-}
-
-/// Where observations contradict a path that nothing but itself holds: it and its map are given up, and another begins
-/// where it ends. What was seen before is located by the map that follows (observation_record.h).
-bool ObservationLocalizer::begin_again(Doubt doubt) {
-  constexpr std::size_t enough_tried = 10, young = 200;  // frames; a path that was right for long is not given up
-  const std::size_t age = num_taken_ - record_.begun();
-  if (!is_free() || (doubt != Doubt::strong && doubt != Doubt::many) || age < enough_tried || age > young) return false;
-  StartHypothesis from = *engine_.start_without_target();
-  from.motion.world_from_cam = engine_.best().motion().world_from_cam;
-  drop_map();
-  engine_.filters().restart({{from}});
-  record_.begin(num_taken_);
-  engine_.forget_doubt();
-  engine_.count_restart();
-  return true;
-}
-
-/// A point whose position no single look can change much: one of the target's, or a settled one. New ones explain
-/// whatever the known ones do not contradict.
-bool ObservationLocalizer::is_firm(long id) const {
-  const auto& features = engine_.best().features();
-  const auto feature = std::ranges::find(features, id, &Feature::id);
-  return feature != features.end() && (feature->is_known || feature->kind == FeatureKind::xyz);
-}
-
-/// Where half of the target is not where the path, as it is now, expects it: where the target says that the camera is,
-/// with how much would be explained from there.
-std::optional<ObservationLocalizer::OtherPlace> ObservationLocalizer::other_place(const ObservationFrame& frame) const {
-  const LocalizationFilter& filter = engine_.best();
-  std::size_t num_seen = 0, num_off = 0;
-  for (const FeatureObservation& observation : frame.observations) {
-    if (std::ranges::count(config_.target.points, observation.id, &KnownPoint::id) == 0) continue;
-    ++num_seen;
-    const auto expected = filter.expected(observation.id);
-    const Eigen::Vector2d nu = expected ? (observation.px - expected->px).eval() : Eigen::Vector2d::Zero();
-    num_off += !expected || nu.dot(expected->S.inverse() * nu) > config_.filter.gate ? 1 : 0;
-  }
-  if (num_seen < 4 || 2 * num_off < num_seen) return std::nullopt;
-  OtherPlace other{poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config()),
-                   0, *engine_.bank()};
-  if (other.from.empty()) return std::nullopt;
-  std::vector<PlacedObservation> placed;
-  for (const FeatureObservation& observation : frame.observations) {
-    const auto place = filter.place(observation.id);
-    if (!place || !is_firm(observation.id)) continue;
-    const double sigma_px = observation.sigma_px > 0.0 ? observation.sigma_px : config_.filter.sigma_px;
-    placed.push_back({observation.px, sigma_px, place->point_in_world, place->cov});
-  }
-  const std::array<Rigid3, 1> there{other.from.front().motion.world_from_cam};
-  if (const auto found = resection(engine_.camera(), placed, there, config_.filter.gate))
-    other.num_explained = found->num_fit;
-  return other;
-}
-
-/// There, if that explains more of the frame than the path did. Where the motion contradicts it, the motion ends there,
-/// and the map that it made is dropped.
-bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& frame,
-                                      const ObservationsReport& report) {
-  std::size_t num_explained = 0;
-  for (std::size_t i = 0; i < frame.observations.size(); ++i)
-    num_explained += report.outcomes[i] == ObservationOutcome::used && is_firm(frame.observations[i].id) ? 1 : 0;
-  const std::size_t min_more = num_explained < min_observations ? 1 : 3;
-  if (other.num_explained < num_explained + min_more) return false;
-  engine_.filters() = std::move(other.before);
-  if (contradiction_of(other.from.front()) > max_contradiction) {
-    record_.jumped(num_taken_);
-    drop_map();
-  }
-  engine_.filters().restart(only_where(std::move(other.from)));
-  record_.begin(num_taken_);
-  engine_.forget_doubt();
-  num_elsewhere_ = 0;
-  engine_.count_restart();
-  return true;
-}
-
 /// By the map's numbers.
 ObservationFrame ObservationLocalizer::numbered(ObservationFrame frame) {
   const auto has_left = [&](long id) { return points_.is_gone(id) && !engine_.best().has(id); };
@@ -349,21 +205,6 @@ FrameEvent ObservationLocalizer::come_to(const ObservationFrame& frame) {
   return FrameEvent::tracked;
 }
 
-/// Where the path is doubted, another begins: from the target, or from where it is.
-void ObservationLocalizer::heed_doubt(const ObservationFrame& frame, std::optional<OtherPlace> other, Doubt doubt,
-                                      const ObservationsReport& report, PathStep& step) {
-  if ((other && find_again(std::move(*other), frame, report)) || restart(frame, doubt)) {
-    const ObservationsReport again = engine_.update(frame.observations);
-    engine_.fill(frame.observations, again, step);
-    step.event = FrameEvent::restarted;
-  }
-  if (begin_again(doubt)) {
-    step.event = FrameEvent::restarted;
-    engine_.fill_pose(step);
-    add_new(frame);
-  }
-}
-
 PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
   PathStep step;
   step.frame = frame.frame;
@@ -382,6 +223,8 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
   const Doubt doubt = engine_.doubt_after(step);
   drop_strangers(frame, report);
   if (config_.restarts) heed_doubt(frame, std::move(other), doubt, report, step);
+  num_known_ += step.num_known;
+  num_known_gated_ += step.num_known_gated;
   if (step.num_tracked >= min_observations || step.event == FrameEvent::started) add_new(frame);
   engine_.filters().convert_linear();
   engine_.keep_given();

@@ -4,6 +4,7 @@
 
 #include "alidade/localize/filter/point_episodes.h"
 #include "alidade/localize/filter/point_store.h"
+#include "alidade/localize/map/repeated_places.h"
 #include "alidade/localize/path/whole_path.h"
 #include "alidade/localize/usual_gap.h"
 
@@ -52,8 +53,9 @@ class ObservationLocalizer {
   void drop_map();
   void place_by_target(const ObservationFrame& frame);
   [[nodiscard]] double contradiction_of(const StartHypothesis& from) const;
-  [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame) const;
-  [[nodiscard]] int num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
+  [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame);
+  [[nodiscard]] int num_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
+  [[nodiscard]] bool is_no_chance(const ObservationFrame& frame, std::span<const StartHypothesis> from, Doubt doubt);
   /// Neither the frame nor the scale of the world is given.
   [[nodiscard]] bool is_free() const { return !config_.start && config_.target.points.empty(); }
   [[nodiscard]] bool begin_again(Doubt doubt);
@@ -66,6 +68,7 @@ class ObservationLocalizer {
   };
   [[nodiscard]] std::optional<OtherPlace> other_place(const ObservationFrame& frame) const;
   [[nodiscard]] bool is_firm(long id) const;
+  [[nodiscard]] bool is_there(const StartHypothesis& there, const Rigid3& found) const;
   [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
   void heed_doubt(const ObservationFrame& frame, std::optional<OtherPlace> other, Doubt doubt,
                   const ObservationsReport& report, PathStep& step);
@@ -92,7 +95,8 @@ class ObservationLocalizer {
   std::vector<FeatureObservation> last_seen_;
   std::size_t num_repeated_ = 0;  ///< Frames that showed the last one again.
   std::size_t num_left_ = 0;      ///< Times that a point left a full filter.
-  int num_elsewhere_ = 0;         ///< Frames in a row in which the target says that the camera is somewhere else.
+  RepeatedPlaces elsewhere_;
+  std::size_t num_known_ = 0, num_known_gated_ = 0;  ///< Of the target's observations, at the poses taken.
 };
 
 }  // namespace alidade

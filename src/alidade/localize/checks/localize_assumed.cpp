@@ -66,6 +66,15 @@ void add_depth_arm(const Localization& report, std::vector<Assumption>& assumed)
   }
 }
 
+/// A mirrored image is the image of a mirrored world: known points have a left and a right, and turns that something
+/// else measures.
+bool has_handedness(const Localization& report) {
+  const bool is_turned =
+      std::ranges::any_of(report.sensor_scales, [](const SensorScale& each) { return each.sensor == "odometry"; });
+  const bool has_known = std::ranges::any_of(report.path, [](const PathStep& step) { return step.num_known > 0; });
+  return report.imu || report.is_in_map || is_turned || has_known;
+}
+
 }  // namespace
 
 std::vector<Assumption> localize_assumed(const Localization& report) {
@@ -98,6 +107,8 @@ std::vector<Assumption> localize_assumed(const Localization& report) {
     assumed.push_back(each);
   }
   add_depth_arm(report, assumed);
+  if (!has_handedness(report))
+    assumed.push_back({.name = "images are not mirrored", .value = std::nan(""), .sigma = 0.0});
   return assumed;
 }
 

@@ -1,0 +1,199 @@
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+
+#include "alidade/geometry/decompositions.h"
+#include "alidade/localize/known_pose.h"
+#include "alidade/localize/observation_localizer.h"
+#include "alidade/localize/path/path_resection.h"
+
+// When the target says that the path is wrong, and where another begins.
+namespace alidade {
+
+/// χ² of six components.
+double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const {
+  const LocalizationFilter& now = engine_.best();
+  const CameraMotion& is = now.motion();
+  Eigen::Vector<double, 6> difference;
+  difference.head<3>() = from.motion.world_from_cam.translation - is.world_from_cam.translation;
+  difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.motion.world_from_cam.rotation);
+  const Eigen::Matrix<double, 6, 6> cov =
+      now.motion_covariance().topLeftCorner<6, 6>() + from.cov.topLeftCorner<6, 6>();
+  return squared_mahalanobis(difference, cov);
+}
+
+constexpr double max_contradiction = 22.5;  // χ² of six components: 99.9 %
+
+/// Where the camera is by the target, if that contradicts the path. Empty: it does not, or its observations fit no
+/// pose.
+std::vector<StartHypothesis> ObservationLocalizer::elsewhere(const ObservationFrame& frame) {
+  std::vector<StartHypothesis> from =
+      poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config());
+  if (from.empty()) return from;
+  const auto agrees = [&](const StartHypothesis& each) { return contradiction_of(each) < max_contradiction; };
+  if (std::ranges::any_of(from, agrees)) {
+    from.clear();
+    elsewhere_.clear();
+  }
+  return from;
+}
+
+/// How many of the target's observations a pose explains.
+int ObservationLocalizer::num_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const {
+  const double gate_px2 = 4.0 * config_.filter.gate * config_.filter.sigma_px * config_.filter.sigma_px;
+  int num = 0;
+  for (const FeatureObservation& observation : frame.observations) {
+    const auto known = std::ranges::find(config_.target.points, observation.id, &KnownPoint::id);
+    if (known == config_.target.points.end()) continue;
+    const auto px = project(engine_.camera(), world_from_cam.inverse() * known->point_in_world);
+    num += px && (*px - observation.px).squaredNorm() < gate_px2 ? 1 : 0;
+  }
+  return num;
+}
+
+/// Whether a place of the target's against the path is one: hardly any of its observations so far were mismatches,
+/// enough agree on it, or so many frames before had the same correction of the path.
+bool ObservationLocalizer::is_no_chance(const ObservationFrame& frame, std::span<const StartHypothesis> from,
+                                        Doubt doubt) {
+  constexpr int enough = 6;
+  constexpr double few_mismatches = 0.15;
+  const bool has_mismatches = share(num_known_gated_, num_known_) > few_mismatches;
+  const std::size_t num_before = elsewhere_.add(from, engine_.best().motion().world_from_cam, num_taken_);
+  if (doubt == Doubt::some && num_before < (has_mismatches ? 1 : 2)) return false;
+  return !has_mismatches || num_before > 0 || num_explained(frame, from.front().motion.world_from_cam) >= enough;
+}
+
+/// All but the target.
+void ObservationLocalizer::drop_map() {
+  std::vector<long> unknown;
+  for (const Feature& feature : engine_.best().features())
+    if (!feature.is_known) unknown.push_back(feature.id);
+  for (const long id : unknown) engine_.filters().remove(id);
+  points_.forget_gone();
+}
+
+/// From the target, where it says that the camera is somewhere else. Mismatches may look like another pose: where the
+/// observations that fit are not contradicted by themselves, it has to explain at least two more of the target's, and
+/// where there is only some doubt two or three frames have to say so. The map of points that led there is dropped.
+bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
+  constexpr int min_more = 2;
+  std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);
+  if (from.empty()) return false;
+  const Rigid3& now = engine_.best().motion().world_from_cam;
+  const int num_more = num_explained(frame, from.front().motion.world_from_cam) - num_explained(frame, now);
+  if (doubt != Doubt::strong && num_more < min_more) return false;
+  if (!is_no_chance(frame, from, doubt)) return false;
+  drop_map();
+  engine_.filters().restart(only_where(from));
+  record_.begin(num_taken_);
+  engine_.forget_doubt();
+  elsewhere_.clear();
+  engine_.count_restart();
+  return true;
+}
+
+/// Where observations contradict a path that nothing but itself holds: it and its map are given up, and another begins
+/// where it ends. What was seen before is located by the map that follows (observation_record.h).
+bool ObservationLocalizer::begin_again(Doubt doubt) {
+  constexpr std::size_t enough_tried = 10, young = 200;  // frames; a path that was right for long is not given up
+  const std::size_t age = num_taken_ - record_.begun();
+  if (!is_free() || (doubt != Doubt::strong && doubt != Doubt::many) || age < enough_tried || age > young) return false;
+  StartHypothesis from = *engine_.start_without_target();
+  from.motion.world_from_cam = engine_.best().motion().world_from_cam;
+  drop_map();
+  engine_.filters().restart({{from}});
+  record_.begin(num_taken_);
+  engine_.forget_doubt();
+  engine_.count_restart();
+  return true;
+}
+
+/// A point whose position no single look can change much: one of the target's, or a settled one. New ones explain
+/// whatever the known ones do not contradict.
+bool ObservationLocalizer::is_firm(long id) const {
+  const auto& features = engine_.best().features();
+  const auto feature = std::ranges::find(features, id, &Feature::id);
+  return feature != features.end() && (feature->is_known || feature->kind == FeatureKind::xyz);
+}
+
+/// Whether a pose found from there is that place, and not the path: the map leads a chance pose back to it.
+bool ObservationLocalizer::is_there(const StartHypothesis& there, const Rigid3& found) const {
+  const Eigen::Matrix<double, 6, 6> cov = there.cov.topLeftCorner<6, 6>();
+  const auto away = [&](const Rigid3& from) {
+    Eigen::Vector<double, 6> difference;
+    difference.head<3>() = found.translation - from.translation;
+    difference.tail<3>() = log_so3(from.rotation.conjugate() * found.rotation);
+    return squared_mahalanobis(difference, cov);
+  };
+  return away(there.motion.world_from_cam) < away(engine_.best().motion().world_from_cam);
+}
+
+/// Where half of the target is not where the path, as it is now, expects it: where the target says that the camera is,
+/// with how much would be explained from there.
+std::optional<ObservationLocalizer::OtherPlace> ObservationLocalizer::other_place(const ObservationFrame& frame) const {
+  const LocalizationFilter& filter = engine_.best();
+  std::size_t num_seen = 0, num_off = 0;
+  for (const FeatureObservation& observation : frame.observations) {
+    if (std::ranges::count(config_.target.points, observation.id, &KnownPoint::id) == 0) continue;
+    ++num_seen;
+    const auto expected = filter.expected(observation.id);
+    const Eigen::Vector2d nu = expected ? (observation.px - expected->px).eval() : Eigen::Vector2d::Zero();
+    num_off += !expected || nu.dot(expected->S.inverse() * nu) > config_.filter.gate ? 1 : 0;
+  }
+  if (num_seen < 4 || 2 * num_off < num_seen) return std::nullopt;
+  OtherPlace other{poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config()),
+                   0, *engine_.bank()};
+  if (other.from.empty()) return std::nullopt;
+  std::vector<PlacedObservation> placed;
+  for (const FeatureObservation& observation : frame.observations) {
+    const auto place = filter.place(observation.id);
+    if (!place || !is_firm(observation.id)) continue;
+    const double sigma_px = observation.sigma_px > 0.0 ? observation.sigma_px : config_.filter.sigma_px;
+    placed.push_back({observation.px, sigma_px, place->point_in_world, place->cov});
+  }
+  const std::array<Rigid3, 1> there{other.from.front().motion.world_from_cam};
+  const auto found = resection(engine_.camera(), placed, there, config_.filter.gate);
+  if (found && is_there(other.from.front(), found->world_from_cam)) other.num_explained = found->num_fit;
+  return other;
+}
+
+/// There, if that explains more of the frame than the path did. Where the motion contradicts it, the motion ends there,
+/// and the map that it made is dropped.
+bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& frame,
+                                      const ObservationsReport& report) {
+  std::size_t num_explained = 0;
+  for (std::size_t i = 0; i < frame.observations.size(); ++i)
+    num_explained += report.outcomes[i] == ObservationOutcome::used && is_firm(frame.observations[i].id) ? 1 : 0;
+  const std::size_t min_more = num_explained < min_observations ? 1 : 3;
+  if (other.num_explained < num_explained + min_more) return false;
+  const bool is_sure = is_no_chance(frame, other.from, Doubt::strong);
+  if (contradiction_of(other.from.front()) > max_contradiction && !is_sure) return false;
+  engine_.filters() = std::move(other.before);
+  if (contradiction_of(other.from.front()) > max_contradiction) {
+    record_.jumped(num_taken_);
+    drop_map();
+  }
+  engine_.filters().restart(only_where(std::move(other.from)));
+  record_.begin(num_taken_);
+  engine_.forget_doubt();
+  elsewhere_.clear();
+  engine_.count_restart();
+  return true;
+}
+
+/// Where the path is doubted, another begins: from the target, or from where it is.
+void ObservationLocalizer::heed_doubt(const ObservationFrame& frame, std::optional<OtherPlace> other, Doubt doubt,
+                                      const ObservationsReport& report, PathStep& step) {
+  if ((other && find_again(std::move(*other), frame, report)) || restart(frame, doubt)) {
+    const ObservationsReport again = engine_.update(frame.observations);
+    engine_.fill(frame.observations, again, step);
+    step.event = FrameEvent::restarted;
+  }
+  if (begin_again(doubt)) {
+    step.event = FrameEvent::restarted;
+    engine_.fill_pose(step);
+    add_new(frame);
+  }
+}
+
+}  // namespace alidade

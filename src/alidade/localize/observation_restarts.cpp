@@ -59,7 +59,7 @@ bool ObservationLocalizer::is_no_chance(const ObservationFrame& frame, std::span
   constexpr double few_mismatches = 0.15;
   const bool has_mismatches = share(num_known_gated_, num_known_) > few_mismatches;
   const std::size_t num_before = elsewhere_.add(from, engine_.best().motion().world_from_cam, num_taken_);
-  if (doubt == Doubt::some && num_before < (has_mismatches ? 1 : 2)) return false;
+  if (doubt == Doubt::some && num_before < 2) return false;
   return !has_mismatches || num_before > 0 || num_explained(frame, from.front().motion.world_from_cam) >= enough;
 }
 
@@ -74,7 +74,7 @@ void ObservationLocalizer::drop_map() {
 
 /// From the target, where it says that the camera is somewhere else. Mismatches may look like another pose: where the
 /// observations that fit are not contradicted by themselves, it has to explain at least two more of the target's, and
-/// where there is only some doubt two or three frames have to say so. The map of points that led there is dropped.
+/// where there is only some doubt three frames have to say so. The map of points that led there is dropped.
 bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
   constexpr int min_more = 2;
   std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);

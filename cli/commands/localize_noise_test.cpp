@@ -58,7 +58,7 @@ TEST_F(LocalizeNoise, ChancePosesOfAMismatchedTargetDoNotMoveThePath) {
   const Outcome outcome = localize({"--truth", path("sim/truth.tum"), "--json"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const nlohmann::json estimate = nlohmann::json::parse(outcome.out)["estimate"];
-  EXPECT_LT(estimate["ate_m"], 0.0015) << estimate;  // 0.7 mm; where a chance pose begins another path 3 mm
+  EXPECT_LT(estimate["ate_m"], 0.0015) << estimate;      // 0.7 mm; where a chance pose begins another path 3 mm
   EXPECT_LT(estimate["nees_per_dof"], 3.7) << estimate;  // χ²₆/6 at 99.9 %
 }
 

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -60,6 +61,22 @@ TEST_F(LocalizeNoise, ChancePosesOfAMismatchedTargetDoNotMoveThePath) {
   const nlohmann::json estimate = nlohmann::json::parse(outcome.out)["estimate"];
   EXPECT_LT(estimate["ate_m"], 0.0015) << estimate;      // 0.7 mm; where a chance pose begins another path 3 mm
   EXPECT_LT(estimate["nees_per_dof"], 3.7) << estimate;  // χ²₆/6 at 99.9 %
+}
+
+/// Without known points a mirrored world explains mirrored images.
+TEST_F(LocalizeNoise, ThatImagesAreNotMirroredIsAssumedWithoutKnownPoints) {
+  simulate({"--points", "30", "--frames", "30", "--rate", "30"});
+  const auto assumes = [&](const std::vector<std::string>& options) {
+    const Outcome outcome = alidade({"localize", path("sim/sights.csv"), "--camera", path("sim/camera.yaml"), "--out",
+                                     path("out"), "--no-report", "--json"},
+                                    options);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    const nlohmann::json assumed = nlohmann::json::parse(outcome.out)["assumed"];
+    return std::ranges::any_of(assumed,
+                               [](const nlohmann::json& row) { return row["name"] == "images are not mirrored"; });
+  };
+  EXPECT_TRUE(assumes({}));
+  EXPECT_FALSE(assumes({"--target", path("sim/target.yaml")}));
 }
 
 }  // namespace

@@ -40,4 +40,10 @@ CameraMotion retract(const CameraMotion& motion, const Eigen::Vector<double, mot
   return result;
 }
 
+Eigen::Vector<double, 6> pose_difference(const Rigid3& to, const Rigid3& from) {
+  Eigen::Vector<double, 6> difference;
+  difference << to.translation - from.translation, log_so3(from.rotation.conjugate() * to.rotation);
+  return difference;
+}
+
 }  // namespace alidade

@@ -38,5 +38,8 @@ struct MotionJacobians {
 /// Motion ⊞ error: the nominal one moved by 12 components.
 [[nodiscard]] CameraMotion retract(const CameraMotion& motion, const Eigen::Vector<double, motion_dim>& error);
 
+/// The error by which retract() moves the pose `from` to `to`: position in the world [m], rotation on the right [rad].
+[[nodiscard]] Eigen::Vector<double, 6> pose_difference(const Rigid3& to, const Rigid3& from);
+
 ALIDADE_PUBLIC_END
 }  // namespace alidade

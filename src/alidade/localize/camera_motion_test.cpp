@@ -32,6 +32,17 @@ Error difference(const CameraMotion& to, const CameraMotion& from) {
   return error;
 }
 
+TEST(CameraMotion, ADifferenceOfPosesIsTheErrorBetweenThem) {
+  auto rng = testing::make_rng();
+  for (const double turn : {0.0, 1e-7, 1e-3, 0.5}) {
+    const CameraMotion from = random_motion(rng, turn);
+    Error error = difference(random_motion(rng, turn), CameraMotion());
+    error.tail<6>().setZero();
+    const CameraMotion to = retract(from, error);
+    EXPECT_LT((pose_difference(to.world_from_cam, from.world_from_cam) - error.head<6>()).norm(), 1e-9) << turn;
+  }
+}
+
 TEST(CameraMotion, JacobiansAreThoseOfCentralDifferences) {
   auto rng = testing::make_rng();
   int num_cases = 0;

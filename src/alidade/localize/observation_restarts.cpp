@@ -13,13 +13,9 @@ namespace alidade {
 /// χ² of six components.
 double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const {
   const LocalizationFilter& now = engine_.best();
-  const CameraMotion& is = now.motion();
-  Eigen::Vector<double, 6> difference;
-  difference.head<3>() = from.motion.world_from_cam.translation - is.world_from_cam.translation;
-  difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.motion.world_from_cam.rotation);
   const Eigen::Matrix<double, 6, 6> cov =
       now.motion_covariance().topLeftCorner<6, 6>() + from.cov.topLeftCorner<6, 6>();
-  return squared_mahalanobis(difference, cov);
+  return squared_mahalanobis(pose_difference(from.motion.world_from_cam, now.motion().world_from_cam), cov);
 }
 
 constexpr double max_contradiction = 22.5;  // χ² of six components: 99.9 %
@@ -52,7 +48,8 @@ int ObservationLocalizer::num_explained(const ObservationFrame& frame, const Rig
 }
 
 /// Whether a place of the target's against the path is one: hardly any of its observations so far were mismatches,
-/// enough agree on it, or so many frames before had the same correction of the path.
+/// enough agree on it, or a frame before had the same correction of the path. Two frames before, where there is only
+/// some doubt.
 bool ObservationLocalizer::is_no_chance(const ObservationFrame& frame, std::span<const StartHypothesis> from,
                                         Doubt doubt) {
   constexpr int enough = 6;
@@ -119,12 +116,7 @@ bool ObservationLocalizer::is_firm(long id) const {
 /// Whether a pose found from there is that place, and not the path: the map leads a chance pose back to it.
 bool ObservationLocalizer::is_there(const StartHypothesis& there, const Rigid3& found) const {
   const Eigen::Matrix<double, 6, 6> cov = there.cov.topLeftCorner<6, 6>();
-  const auto away = [&](const Rigid3& from) {
-    Eigen::Vector<double, 6> difference;
-    difference.head<3>() = found.translation - from.translation;
-    difference.tail<3>() = log_so3(from.rotation.conjugate() * found.rotation);
-    return squared_mahalanobis(difference, cov);
-  };
+  const auto away = [&](const Rigid3& from) { return squared_mahalanobis(pose_difference(found, from), cov); };
   return away(there.motion.world_from_cam) < away(engine_.best().motion().world_from_cam);
 }
 
@@ -166,8 +158,8 @@ bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& 
     num_explained += report.outcomes[i] == ObservationOutcome::used && is_firm(frame.observations[i].id) ? 1 : 0;
   const std::size_t min_more = num_explained < min_observations ? 1 : 3;
   if (other.num_explained < num_explained + min_more) return false;
-  const bool is_sure = is_no_chance(frame, other.from, Doubt::strong);
-  if (contradiction_of(other.from.front()) > max_contradiction && !is_sure) return false;
+  const bool is_against = contradiction_of(other.from.front()) > max_contradiction;
+  if (is_against && !is_no_chance(frame, other.from, Doubt::strong)) return false;
   engine_.filters() = std::move(other.before);
   if (contradiction_of(other.from.front()) > max_contradiction) {
     record_.jumped(num_taken_);

@@ -1,7 +1,6 @@
 #include "alidade/localize/map/repeated_places.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "alidade/geometry/decompositions.h"
 
@@ -10,24 +9,15 @@ namespace {
 
 constexpr std::size_t max_age = 60;  // frames; by then the path itself has drifted
 
-using Error6 = Eigen::Vector<double, 6>;
-
-Error6 difference(const Rigid3& a, const Rigid3& b) {
-  Error6 all;
-  all.head<3>() = a.translation - b.translation;
-  all.tail<3>() = log_so3(b.rotation.conjugate() * a.rotation);
-  return all;
-}
-
 /// Whether `there` is where `before` has led along the path, from `from` to `to`.
 bool is_same(const StartHypothesis& there, const StartHypothesis& before, const Rigid3& from, const Rigid3& to) {
   constexpr double max_chi2 = 22.5, path_error = 0.1;
   const Rigid3 expected = before.motion.world_from_cam * from.inverse() * to;
-  const Error6 moved = path_error * difference(to, from);
+  const Eigen::Vector<double, 6> moved = path_error * pose_difference(to, from);
   Eigen::Matrix<double, 6, 6> cov = there.cov.topLeftCorner<6, 6>() + before.cov.topLeftCorner<6, 6>();
   cov.diagonal().head<3>().array() += moved.head<3>().squaredNorm();
   cov.diagonal().tail<3>().array() += moved.tail<3>().squaredNorm();
-  return squared_mahalanobis(difference(there.motion.world_from_cam, expected), cov) < max_chi2;
+  return squared_mahalanobis(pose_difference(there.motion.world_from_cam, expected), cov) < max_chi2;
 }
 
 }  // namespace

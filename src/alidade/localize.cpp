@@ -330,7 +330,9 @@ Localization localize(const ImageStream& images, const Camera& camera, const Loc
     report_progress(progress, "localize", done, std::max(images.num_images, done + 1));
     localizer.push(grey, frame, t_s);
   }
-  return localizer.finish(truth);
+  Localization result = localizer.finish(truth);
+  if (images.own_rate_hz) add_rate_assumed(images.own_rate_hz(), result);
+  return result;
 }
 
 }  // namespace alidade

@@ -96,6 +96,15 @@ std::vector<double> asl_times_s(const path& file, const path& images) {
   return times_s;
 }
 
+/// A rate given beside EuRoC's table has to be the table's.
+void require_same_rate(const path& file, const std::vector<double>& times_s, double rate_hz) {
+  if (!(rate_hz > 0.0) || times_s.size() < 2) return;
+  const double own_hz = static_cast<double>(times_s.size() - 1) / (times_s.back() - times_s.front());
+  if (std::abs(own_hz / rate_hz - 1.0) > 0.01)
+    throw InputError(
+        fmt::format("{}: has times, {:.4g} images a second; leave --rate {:.4g} out", file.string(), own_hz, rate_hz));
+}
+
 GreyPatch read_patch(const path& file) {
   cv::Mat image = decode_photo(read_file(file)), grey;
   if (image.channels() > 1)
@@ -124,13 +133,16 @@ class ImageSequence {
   ImageSequence(const path& given, double rate_hz, int width_px, int height_px, const MoreImages& more);
   [[nodiscard]] bool next(cv::Mat& grey, long& frame, double& t_s);
   [[nodiscard]] std::size_t num_images() const { return frames_.num_frames(); }
+  [[nodiscard]] double own_rate_hz() const;
 
  private:
   VideoFrames frames_;
   [[nodiscard]] double time_in_video(long frame);
+  void note_own_time();
 
   std::vector<double> times_s_;  ///< One per image; empty: number over rate, or without one as the video says.
   std::optional<double> first_s_, last_s_;  ///< In the video.
+  std::size_t last_number_ = 0;             ///< Of the frame that is last there, counted from the first.
   double rate_hz_;
   int width_px_, height_px_;
   std::size_t count_ = 0;
@@ -144,10 +156,16 @@ ImageSequence::ImageSequence(const path& given, double rate_hz, int width_px, in
   const AslFolder asl = asl_folder(given);
   if (more && !asl.table.empty())
     throw InputError(given.string() + ": only a folder of numbered images can be waited for, not one with data.csv");
-  if (!asl.table.empty())
+  if (!asl.table.empty()) {
     times_s_ = asl_times_s(asl.table, asl.images);
-  else if (std::error_code ignored; !(rate_hz > 0.0) && std::filesystem::is_directory(given, ignored))
+    require_same_rate(asl.table, times_s_, rate_hz);
+  } else if (std::error_code ignored; !(rate_hz > 0.0) && std::filesystem::is_directory(given, ignored))
     throw InputError(given.string() + ": has no times; give --rate, frames a second");
+}
+
+double ImageSequence::own_rate_hz() const {
+  if (!(rate_hz_ > 0.0) || last_number_ == 0 || !(*last_s_ > *first_s_)) return 0.0;
+  return static_cast<double>(last_number_) / (*last_s_ - *first_s_);
 }
 
 /// As the video says, from its first frame on: phones do not film at one rate.
@@ -176,8 +194,15 @@ bool ImageSequence::next(cv::Mat& grey, long& frame, double& t_s) {
   else
     t_s = rate_hz_ > 0.0 ? static_cast<double>(frame) / rate_hz_ : time_in_video(frame);
   if (!times_s_.empty()) frame = static_cast<long>(count_);
+  if (rate_hz_ > 0.0 && std::isfinite(frames_.time_s())) note_own_time();
   ++count_;
   return true;
+}
+
+void ImageSequence::note_own_time() {
+  if (!first_s_) first_s_ = frames_.time_s();
+  last_s_ = frames_.time_s();
+  last_number_ = count_;
 }
 
 }  // namespace
@@ -201,7 +226,7 @@ std::int64_t origin_ns_of(const path& given) {
 ImageStream images_in(const path& given, const Camera& camera, double rate_hz, const std::function<bool()>& more) {
   const auto images = std::make_shared<ImageSequence>(given, rate_hz, camera.width_px, camera.height_px, more);
   const auto next = [images](cv::Mat& grey, long& frame, double& t_s) { return images->next(grey, frame, t_s); };
-  return {next, images->num_images()};
+  return {next, images->num_images(), [images] { return images->own_rate_hz(); }};
 }
 
 LocalizeTarget read_image_target(const path& file) {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "alidade/localize.h"
+#include "alidade/localize/checks/judge.h"
 #include "alidade/simulate/underwater.h"
 #include "alidade/testing/imu_run.h"
 
@@ -89,6 +90,21 @@ TEST(FrameTimes, AnImuShowsWhetherTheyAreRight) {
     config.sigma_times_s = 0.0;
     EXPECT_EQ(localize(run.frames, run.camera, config, run.truth).verdict.state, State::good);
   }
+}
+
+TEST(FrameTimes, ARateOtherThanTheVideosOwnIsAssumed) {
+  Localization result;
+  for (int i = 0; i <= 10; ++i) {
+    result.path.emplace_back();
+    result.path.back().t_s = 0.02 * i;
+  }
+  add_rate_assumed(0.0, result);   // a folder
+  add_rate_assumed(50.2, result);  // rounded
+  EXPECT_TRUE(result.assumed.empty());
+  add_rate_assumed(25.0, result);
+  ASSERT_EQ(result.assumed.size(), 1u);
+  EXPECT_EQ(result.assumed.front().name, "frames a second, not the video's own 25");
+  EXPECT_NEAR(result.assumed.front().value, 50.0, 1e-9);
 }
 
 }  // namespace

@@ -44,6 +44,8 @@ using NextImage = std::function<bool(cv::Mat& grey, long& frame, double& t_s)>;
 struct ImageStream {
   NextImage next;
   std::size_t num_images = 0;  ///< For progress; 0: not known.
+  /// Frames a second by the video's own times, of what has been read, where a rate was given instead of them; 0: none.
+  std::function<double()> own_rate_hz = {};
 };
 
 /// A feature searched for in an image: for drawing.

@@ -7,6 +7,9 @@ namespace alidade {
 /// What the path takes as given: the camera, and the target's scale.
 [[nodiscard]] std::vector<Assumption> localize_assumed(const Localization& result);
 
+/// Where the times were made of a rate though the video has its own, another one by more than 1 %: so assumed. 0: none.
+void add_rate_assumed(double own_rate_hz, Localization& result);
+
 /// Whether the path stands. A path that its observations contradict is never good.
 [[nodiscard]] Verdict localize_verdict(const Localization& result);
 

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -110,6 +112,17 @@ std::vector<Assumption> localize_assumed(const Localization& report) {
   if (!has_handedness(report))
     assumed.push_back({.name = "images are not mirrored", .value = std::nan(""), .sigma = 0.0});
   return assumed;
+}
+
+void add_rate_assumed(double own_rate_hz, Localization& result) {
+  if (!(own_rate_hz > 0.0) || result.path.size() < 2) return;
+  const double taken_hz =
+      static_cast<double>(result.path.size() - 1) / (result.path.back().t_s - result.path.front().t_s);
+  if (std::abs(own_rate_hz / taken_hz - 1.0) <= 0.01) return;
+  result.assumed.push_back({.name = fmt::format("frames a second, not the video's own {:.4g}", own_rate_hz),
+                            .value = taken_hz,
+                            .sigma = 0.0,
+                            .remedy = "leave --rate out"});
 }
 
 }  // namespace alidade

@@ -278,8 +278,6 @@ CornerFit fit_of(const Solution& solution, double num_pixels) {
   const double variance = cost_of(solution.sums) / (num_pixels - 7.0);
   fit.px = model.px;
   fit.cov = covariance_of(solution, variance);
-  fit.edge_cols = {std::cos(model.angle_rad[0]), std::sin(model.angle_rad[0])};
-  fit.edge_rows = {std::cos(model.angle_rad[1]), std::sin(model.angle_rad[1])};
   fit.blur_px = model.blur_px;
   fit.contrast = -model.contrast;  // left normals: between +along_cols and +along_rows, d₁ and d₂ differ in sign
   fit.rms = std::sqrt(variance);

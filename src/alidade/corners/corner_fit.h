@@ -31,9 +31,7 @@ struct CornerFitConfig {
 /// A corner below the pixel, with its covariance: inverse normal matrix times the residual variance.
 struct CornerFit {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();     ///< [px²]
-  Eigen::Vector2d edge_cols = Eigen::Vector2d::UnitX();  ///< Unit directions of the two edges.
-  Eigen::Vector2d edge_rows = Eigen::Vector2d::UnitY();
+  Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< [px²]
   double blur_px = 0.0;
   double contrast =
       0.0;           ///< Signed half step: positive where the quadrant between +along_cols and +along_rows is bright.

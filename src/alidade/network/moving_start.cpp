@@ -211,7 +211,6 @@ MovingStart start_cameras(std::span<const ObservationSeries> series, double sear
     if (num_placed(*start) > num_placed(best)) best = std::move(*start);
   }
   best.has_common = !pairs.empty();
-  best.best_share = by_strength.empty() ? 0.0 : by_strength.front().share;
   return best;
 }
 

@@ -21,7 +21,6 @@ struct MovingStart {
   std::size_t first = 0, second = 0;  ///< The pair that it began with: the unit of length.
   std::vector<double> t_s;            ///< By the clock of `first`.
   std::vector<Eigen::Vector3d> path;
-  double best_share = 0.0;  ///< Of the best pair of cameras; below one half there is no start.
   bool has_common = false;  ///< Two cameras saw the target together at all.
   bool found = false;
 };

@@ -230,7 +230,6 @@ void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& 
   start[P::latency] = std::max(0.0, theta[P::latency] - 0.5 * sampling->period_s);
   SampledFit best = fitted_to_samples(problem, *sampling, start);
   leave_wrong_samples(problem, fit.fastest_rad_s, best);
-  fit.encoder_evidence = cost - problem.misfit(best.theta).squaredNorm();
   if (best.cost >= 2.0 * cost) return;
   fit.encoder_hz = 1.0 / best.sampling.period_s;
   problem = std::move(best.problem);

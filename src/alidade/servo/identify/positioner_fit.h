@@ -49,7 +49,6 @@ struct PositionerFit {
   double offset_rad = 0.0, sigma_offset_rad = 0.0;  ///< What is read at rest less what was commanded.
   double gain = 1.0, sigma_gain = 0.0;  ///< What is read at rest for a radian commanded; −1: a mirrored axis.
   double encoder_hz = 0.0;              ///< It is read so often; 0: whenever it is asked.
-  double encoder_evidence = 0.0;
   double renewal_s = 0.0;     ///< Readings are renewed so seldom, at no regular times: a cached status; 0: not seen.
   bool reads_target = false;  ///< Its reading is the commanded position, at once.
   bool reached_rate = false;  ///< The largest rate lasted for a while.

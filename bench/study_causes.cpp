@@ -57,6 +57,13 @@ Found found_of(const Case<Setup>& one, double size, int draws) {
   return found;
 }
 
+/// "0.5 %", "0.002"; "–" of what has no size.
+template <typename Setup>
+std::string size_text(const Case<Setup>& one, double size) {
+  if (one.sizes.size() == 1 && *one.unit == '\0') return "–";
+  return *one.unit == '\0' ? fmt::format("{:g}", size) : fmt::format("{:g} {}", size, one.unit);
+}
+
 /// One table; returns how many good verdicts stood over an error above 5σ.
 template <typename Setup>
 int table_of(const std::vector<Case<Setup>>& cases, int draws, const std::string& only) {
@@ -71,13 +78,12 @@ int table_of(const std::vector<Case<Setup>>& cases, int draws, const std::string
       silent += found.silent;
       if (found.seen < 0.99) seen_from = -1.0;
       if (found.seen >= 0.99 && seen_from < 0.0) seen_from = size;
-      fmt::print("| {} | {} | {:.0f} % | {:.0f} % | {:.1f}σ | {} |\n", one.name,
-                 *one.unit == '\0' ? std::string("–") : fmt::format("{:g} {}", size, one.unit), 100.0 * found.seen,
-                 100.0 * found.good, found.worst, found.silent);
+      fmt::print("| {} | {} | {:.0f} % | {:.0f} % | {:.1f}σ | {} |\n", one.name, size_text(one, size),
+                 100.0 * found.seen, 100.0 * found.good, found.worst, found.silent);
       std::fflush(stdout);
     }
-    if (*one.unit != '\0' && seen_from >= 0.0)
-      power += fmt::format("{}{} {:g} {}", power.empty() ? "" : ", ", one.name, seen_from, one.unit);
+    if (size_text(one, seen_from) != "–" && seen_from >= 0.0)
+      power += fmt::format("{}{} {}", power.empty() ? "" : ", ", one.name, size_text(one, seen_from));
   }
   if (!power.empty()) fmt::print("\nSeen at 99 % of the draws or more from: {}.\n", power);
   return silent;

@@ -242,7 +242,15 @@ TEST_F(IdentifyCommand, ItsPlantIsAScenario) {
   write_file(path("scenario.yaml"), read_file(path("out/servo.yaml")) + "seeds: 1\nrobustness: {points: 0}\n");
   const Outcome outcome = alidade({"servo", path("scenario.yaml"), "--out", path("servo"), "--json"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_LT(Json::parse(outcome.out)["estimate"]["controllers"]["lqr"]["rms_px"], 1.5);
+  const Json document = Json::parse(outcome.out);
+  EXPECT_LT(document["estimate"]["controllers"]["lqr"]["rms_px"], 1.5);
+  const Json identified = Json::parse(read_file(path("out/result.json")));
+  for (const Json& one : document["assumed"])
+    if (one["name"] == "plant.tau_s")
+      EXPECT_NEAR(one["sigma"].get<double>(), identified["stddev"]["tau_s"].get<double>(), 1e-5);
+  EXPECT_LT(document["estimate"]["loops"]["pi"]["radius_within_3_sigma"], 1.0);
+  EXPECT_GT(document["estimate"]["loops"]["pi"]["radius_within_3_sigma"],
+            document["estimate"]["loops"]["pi"]["sampled_radius"]);
 }
 
 TEST_F(IdentifyCommand, ItsRatePlantIsAScenarioToo) {

@@ -15,6 +15,14 @@ std::vector<Assumption> assumed_of(const ServoScenario& scenario) {
   const auto exact = [&](std::string name, double value) {
     assumed.push_back({.name = std::move(name), .value = value, .sigma = 0.0});
   };
+  if (!scene.plant_sigma.is_exact()) {
+    const ServoAxis& axis = scene.axes[0];
+    const double gain = std::visit([](const auto& plant) { return plant.gain; }, axis.plant);
+    assumed.push_back({.name = "plant.gain", .value = gain, .sigma = scene.plant_sigma.gain});
+    assumed.push_back({.name = "plant.tau_s", .value = tau_of(axis.plant), .sigma = scene.plant_sigma.tau_s});
+    assumed.push_back(
+        {.name = "plant.command_delay_s", .value = axis.command_delay_s, .sigma = scene.plant_sigma.command_delay_s});
+  }
   exact("plant.gain_factor", scene.mismatch.gain);
   exact("plant.tau_factor", scene.mismatch.tau);
   exact("latency_s", scene.latency_s);

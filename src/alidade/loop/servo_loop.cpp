@@ -54,7 +54,7 @@ struct LoopedHead {
 
 std::array<ServoAxis, 2> true_axes(const ServoScene& scene) {
   std::array<ServoAxis, 2> axes = scene.axes;
-  for (ServoAxis& axis : axes) axis.plant = scaled(axis.plant, scene.mismatch.gain, scene.mismatch.tau);
+  for (ServoAxis& axis : axes) axis = as_it_is(axis, scene.mismatch);
   return axes;
 }
 
@@ -254,6 +254,13 @@ constexpr std::array<std::string_view, 3> knowledge_names{"given", "observed", "
 
 }  // namespace
 
+ServoAxis as_it_is(const ServoAxis& known, const PlantMismatch& mismatch) {
+  ServoAxis axis = known;
+  axis.plant = scaled(known.plant, mismatch.gain, mismatch.tau);
+  axis.command_delay_s = std::max(0.0, known.command_delay_s + mismatch.later_s);
+  return axis;
+}
+
 std::string_view lens_knowledge_name(LensKnowledge knowledge) {
   return knowledge_names[static_cast<std::size_t>(knowledge)];
 }
@@ -334,7 +341,8 @@ ServoRobustness servo_robustness(const ServoScene& scene, const ServoConfig& con
     for (const double tau : grid.tau_factors) {
       report_progress(progress, "robustness", grid.rms_px.size(), total);
       ServoScene mismatched = scene;
-      mismatched.mismatch = {scene.mismatch.gain * gain, scene.mismatch.tau * tau};
+      mismatched.mismatch.gain *= gain;
+      mismatched.mismatch.tau *= tau;
       grid.rms_px.push_back(run_servo(mismatched, config, seed).figures.rms_px);
     }
   }

@@ -19,9 +19,17 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Model mismatch: the true plants, as factors on the known ones.
+/// Model mismatch: the true plants, as factors on the known ones, and by how much later their commands act.
 struct PlantMismatch {
-  double gain = 1.0, tau = 1.0;
+  double gain = 1.0, tau = 1.0, later_s = 0.0;
+};
+[[nodiscard]] ServoAxis as_it_is(const ServoAxis& known, const PlantMismatch& mismatch);
+
+/// σ of a plant that was identified: of its gain in its unit, of its time constant, of its delay of commands. 0: exact.
+struct PlantSigma {
+  double gain = 0.0, tau_s = 0.0, command_delay_s = 0.0;
+
+  [[nodiscard]] bool is_exact() const { return gain == 0.0 && tau_s == 0.0 && command_delay_s == 0.0; }
 };
 
 /// Which intrinsics the loop takes its pixels by: the rig's, whatever the lens does; those that an on-line observer
@@ -37,6 +45,7 @@ struct ServoScene {
   RigUncertainty rig_errors;        ///< What the rig's file says of its own; `track` counts it.
   std::array<ServoAxis, 2> axes{};  ///< (pan, tilt) of every head, as known.
   PlantMismatch mismatch;
+  PlantSigma plant_sigma;  ///< Loops have to be stable within three of it.
   TargetPath path;
   double duration_s = 12.0;
   double warm_up_s = 2.0;  ///< Excluded from the figures.

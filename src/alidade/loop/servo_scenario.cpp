@@ -70,6 +70,9 @@ void add_scene(FieldList& fields, ServoScene& scene) {
   add_number(fields, "latency_s", scene.latency_s, {0.0, 10.0});
   add_number(fields, "mismatch.gain", scene.mismatch.gain, {0.01, 100.0});
   add_number(fields, "mismatch.tau", scene.mismatch.tau, {0.01, 100.0});
+  add_number(fields, "plant.sigma_gain", scene.plant_sigma.gain, {0.0, 1e6});
+  add_number(fields, "plant.sigma_tau_s", scene.plant_sigma.tau_s, {0.0, 100.0});
+  add_number(fields, "plant.sigma_command_delay_s", scene.plant_sigma.command_delay_s, {0.0, 10.0});
   add_number(fields, "noise.sigma_px", scene.sigma_px, {0.0, 1e3});
   add_number(fields, "noise.sigma_encoder_rad", scene.sigma_encoder_rad, angles(0.0, 90.0));
   add_number(fields, "noise.encoder_step_rad", scene.encoder_step_rad, angles(0.0, 90.0));

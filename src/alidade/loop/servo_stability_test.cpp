@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -53,6 +54,35 @@ ServoScenario scenario_of(const GridCase& of, ControllerKind kind) {
   scenario.config.command_weight /= of.loop;
   scenario.config.search.enabled = false;
   return scenario;
+}
+
+/// A plant that was identified has σ: what may then be unstable is named, and is as unstable as such a plant makes it.
+TEST(ServoStability, WithinThreeSigmaOfThePlant) {
+  ServoScenario scenario;
+  scenario.controllers = {ControllerKind::pi, ControllerKind::lqr};
+  scenario.num_seeds = 1;
+  scenario.robustness.reset();
+  EXPECT_EQ(check_loops(scenario)[0].radius_within_sigma, 0.0) << "none is given";
+  const auto state_of = [&](double of_gain) {
+    scenario.scene.plant_sigma.gain = of_gain * std::get<AnglePlant>(scenario.scene.axes[0].plant).gain;
+    const ServoStudy study = study_servo(scenario, 1);
+    const Verdict verdict = servo_verdict(scenario, study);
+    for (const LoopCheck& loop : study.loops) {
+      ServoScenario off = scenario;
+      off.scene.plant_sigma = {};
+      off.controllers = {loop.controller};
+      double worst = 0.0;
+      for (const double factor : {1.0 - 3.0 * of_gain, 1.0 + 3.0 * of_gain}) {
+        off.scene.mismatch.gain = std::max(0.01, factor);
+        worst = std::max(worst, check_loops(off)[0].analysis.sampled_radius);
+      }
+      EXPECT_NEAR(loop.radius_within_sigma, worst, 1e-9) << controller_name(loop.controller);
+    }
+    const auto named = std::ranges::find(verdict.checks, "loop of pi within 3 sigma", &Check::name);
+    return named == verdict.checks.end() ? State::refused : named->state;
+  };
+  EXPECT_EQ(state_of(0.003), State::good);
+  EXPECT_EQ(state_of(3.0), State::care);
 }
 
 TEST(ServoStability, WhatIsCalledStableStaysAndWhatIsRefusedDoesNot) {

@@ -70,10 +70,10 @@ Verdict restless(const ServoScenario& scenario, const LoopCheck& loop) {
 Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
   if (loop.analysis.is_stable()) return restless(scenario, loop);
   const ServoScene& scene = scenario.scene;
-  const ServoPlant& plant = scene.axes[loop.axis].plant;
+  const AngleUnit unit = unit_of(scene.axes[loop.axis].plant);
   const double focal_px = focal_of(scene.heads[loop.head].camera);
-  ServoAxis other = scene.axes[loop.axis];
-  other.plant = in_other_unit(scaled(plant, scene.mismatch.gain, scene.mismatch.tau));
+  ServoAxis other = as_it_is(scene.axes[loop.axis], scene.mismatch);
+  other.plant = in_other_unit(other.plant);
   const LoopAnalysis as_other =
       analysed(other, scenario.config.pi.per_rad(focal_px), scene.period_s, images_late(scene, loop.controller));
   Verdict verdict;
@@ -84,7 +84,7 @@ Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
                      text_of(loop.analysis.sampled_radius, 4) + of_which(scenario, loop);
   if (loop.delay_samples >= 0)
     verdict.sentence +=
-        ", loop gain " + text_of(loop.loop_gain, 4) + " error units per " + std::string(unit_name(unit_of(plant)));
+        ", loop gain " + text_of(loop.loop_gain, 4) + " error units per " + std::string(unit_name(unit));
   verdict.to_add = loop.delay_samples < 0 ? "lower rate_gain_per_s, raise command_weight, or identify the plant again"
                    : as_other.is_stable() ? "is the gain in " + std::string(unit_name(unit_of(other.plant))) +
                                                 "? then the radius is " + text_of(as_other.sampled_radius, 4)
@@ -126,6 +126,13 @@ void add_loop_checks(const ServoScenario& scenario, const ServoStudy& study, Ver
                 "spectral radius " + text_of(loop.analysis.sampled_radius, 4) + of_which(scenario, loop) +
                     margin_text(loop.analysis),
                 loop.analysis.sampled_radius, most, "1");
+    if (loop.radius_within_sigma > 0.0)
+      add_check(verdict, name + " within 3 sigma", loop.radius_within_sigma < 1.0,
+                loop.radius_within_sigma < 1.0
+                    ? "stable where the plant is off by three of its sigma"
+                    : "unstable where the plant is off by three of its sigma (spectral radius " +
+                          text_of(loop.radius_within_sigma, 4) + "): log it for longer, or lower the gains",
+                loop.radius_within_sigma, 1.0, "1");
   }
 }
 
@@ -169,16 +176,6 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
   add_loop_checks(scenario, study, verdict);
 }
 
-std::vector<double> evenly(double low, double high, int points) {
-  std::vector<double> values;
-  for (int i = 0; i < points; ++i) values.push_back(points > 1 ? low + (high - low) * i / (points - 1) : low);
-  return values;
-}
-
-}  // namespace
-
-namespace {
-
 /// A controller, tried on both axes as they are.
 double settling_of(const ServoScenario& scenario, ControllerKind kind, double focal_px) {
   const ServoScene& scene = scenario.scene;
@@ -187,8 +184,7 @@ double settling_of(const ServoScenario& scenario, ControllerKind kind, double fo
   config.period_s = scene.period_s;
   double slowest = 0.0;
   for (const ServoAxis& known : scene.axes) {
-    ServoAxis real = known;
-    real.plant = scaled(known.plant, scene.mismatch.gain, scene.mismatch.tau);
+    const ServoAxis real = as_it_is(known, scene.mismatch);
     slowest = std::max(slowest, settling_per_period(config, known, real, focal_px, scene.latency_s));
   }
   return slowest;
@@ -205,8 +201,7 @@ LoopCheck linear_loop_of(const ServoScenario& scenario, ControllerKind kind, std
                          double largest) {
   const ServoScene& scene = scenario.scene;
   const bool is_pi = kind == ControllerKind::pi;
-  ServoAxis axis = scene.axes[of_axis];
-  axis.plant = scaled(axis.plant, scene.mismatch.gain, scene.mismatch.tau);
+  const ServoAxis axis = as_it_is(scene.axes[of_axis], scene.mismatch);
   LoopCheck loop{kind, {}, 0.0, -1};
   const int late = images_late(scene, kind);
   loop.delay_samples = late + samples_in(axis.command_delay_s, scene.period_s);
@@ -240,29 +235,24 @@ LoopCheck worst_loop_of(const ServoScenario& scenario, ControllerKind kind, doub
   return worst;
 }
 
-}  // namespace
-
-namespace {
-
-std::vector<LensComparison> compare_lenses(const ServoScenario& scenario, const ServoStudy& study,
-                                           std::uint64_t first_seed, const Progress& progress) {
-  std::vector<LensComparison> lenses;
-  if (scenario.scene.zoom.is_still() && scenario.scene.intrinsics == LensKnowledge::given) return lenses;
-  ServoConfig config = scenario.config;
-  config.controller = study.best;
-  const auto num_seeds = static_cast<std::size_t>(scenario.num_seeds);
-  for (const LensKnowledge knowledge : {LensKnowledge::given, LensKnowledge::observed, LensKnowledge::truth}) {
-    LensComparison compared{knowledge, {}, {}};
-    ServoScene scene = scenario.scene;
-    scene.intrinsics = knowledge;
-    for (std::size_t i = 0; i < num_seeds; ++i) {
-      report_progress(progress, "lenses", lenses.size() * num_seeds + i, 3 * num_seeds);
-      compared.trials.push_back(run_servo(scene, config, first_seed + i).figures);
-    }
-    compared.figures = put_together(compared.trials);
-    lenses.push_back(std::move(compared));
-  }
-  return lenses;
+/// Of plants that are off by 3σ, each number either way, the largest radius.
+double radius_within_sigma(const ServoScenario& scenario, ControllerKind kind, double largest) {
+  constexpr double in_sigma = 3.0, least = 0.01;
+  const PlantSigma& sigma = scenario.scene.plant_sigma;
+  if (sigma.is_exact()) return 0.0;
+  const ServoPlant& plant = scenario.scene.axes[0].plant;
+  const double gain = std::visit([](const auto& p) { return std::abs(p.gain); }, plant);
+  double radius = 0.0;
+  for (const double of_gain : {-in_sigma, in_sigma})
+    for (const double of_tau : {-in_sigma, in_sigma})
+      for (const double of_delay : {-in_sigma, in_sigma}) {
+        ServoScenario off = scenario;
+        off.scene.mismatch.gain *= std::max(least, 1.0 + of_gain * sigma.gain / gain);
+        off.scene.mismatch.tau *= std::max(least, 1.0 + of_tau * sigma.tau_s / tau_of(plant));
+        off.scene.mismatch.later_s += of_delay * sigma.command_delay_s;
+        radius = std::max(radius, worst_loop_of(off, kind, largest).analysis.sampled_radius);
+      }
+  return radius;
 }
 
 }  // namespace
@@ -283,47 +273,10 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
       worst.swings_by = swing.cause;
       worst.free_px = swing.free_px;
     }
+    if (worst.is_stable()) worst.radius_within_sigma = radius_within_sigma(scenario, kind, largest);
     loops.push_back(worst);
   }
   return loops;
-}
-
-ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, const Progress& progress,
-                       const ServoWatch& watch) {
-  ServoStudy study;
-  study.loops = check_loops(scenario);
-  if (!std::ranges::all_of(study.loops, &LoopCheck::is_stable)) return study;
-  study.status = ServoStudy::Status::compared;
-  const auto num_seeds = static_cast<std::size_t>(scenario.num_seeds);
-  ServoConfig config = scenario.config;
-  for (const ControllerKind kind : scenario.controllers) {
-    config.controller = kind;
-    ServoComparison compared{kind, {}, {}};
-    std::vector<ServoFigures> figures;
-    std::function<void(const ServoRow&)> watch_first;
-    if (watch) watch_first = [&](const ServoRow& row) { watch(kind, row); };
-    for (std::size_t i = 0; i < num_seeds; ++i) {
-      report_progress(progress, "trials", study.trials.size(), num_seeds * scenario.controllers.size());
-      ServoRun run = run_servo(scenario.scene, config, first_seed + i, i == 0 ? watch_first : nullptr);
-      figures.push_back(run.figures);
-      study.trials.push_back({kind, first_seed + i, run.figures});
-      if (i == 0) compared.shown = std::move(run);
-    }
-    compared.figures = put_together(figures);
-    study.comparison.push_back(std::move(compared));
-  }
-  study.best = std::ranges::min_element(study.comparison, {}, [](const ServoComparison& c) {
-                 return c.figures.rms_px;
-               })->controller;
-  study.lenses = compare_lenses(scenario, study, first_seed, progress);
-  if (scenario.scene.heads.size() > 1) study.track = track_of(scenario.scene, best_of(study).shown);
-  if (scenario.robustness) {
-    const RobustnessConfig& grid = *scenario.robustness;
-    config.controller = study.best;
-    study.robustness = servo_robustness(scenario.scene, config, evenly(grid.gain_low, grid.gain_high, grid.points),
-                                        evenly(grid.tau_low, grid.tau_high, grid.points), first_seed, progress);
-  }
-  return study;
 }
 
 Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {

@@ -31,6 +31,8 @@ struct LoopCheck {
   std::string swings_by = {};  ///< Without which alone it rests, or all of them; empty: it rests.
   std::size_t head = 0;        ///< Of whose lens it is the loop: the one nearest to instability.
   std::size_t axis = 0;        ///< Of which axis: 0 pan, 1 tilt.
+  /// Largest |eigenvalue| where gain, time constant and delay of the plant are off by 3σ, each either way; 0: no σ.
+  double radius_within_sigma = 0.0;
 
   [[nodiscard]] bool is_stable() const;
   [[nodiscard]] bool swings() const { return swing_px > 0.0; }

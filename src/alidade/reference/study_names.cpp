@@ -100,6 +100,7 @@ loops.*.
   phase_margin_deg  deg    of the sampled loop with its delays; below 0: unstable
   loop_gain         1      of the loop
   swing_px          px     that limits of rate and acceleration, or backlash, keep it swinging by for good after a jump, about its mean; 0: it rests
+  radius_within_3_sigma  1  the largest of sampled_radius where gain, time constant and delay of the plant are off by 3 of their sigma, each either way; null: none is given
 best              text  controller
 specification_px  px    asked for
 *                 any   of a part that was asked for

@@ -197,6 +197,7 @@ void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDo
     value["phase_margin_deg"] = known.margin;
     value["loop_gain"] = known.gain;
     value["swing_px"] = loop.swing_px;
+    value["radius_within_3_sigma"] = loop.radius_within_sigma > 0.0 ? loop.radius_within_sigma : missing_value;
     estimate["loops"][controller_name(loop.controller)] = value;
   }
   document.data.push_back(loops_table(study));

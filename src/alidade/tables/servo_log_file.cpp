@@ -71,10 +71,12 @@ std::string servo_plant_text(const ServoFit& fit) {
     flaw_sigmas += fmt::format(", {} {:.3g}", key, fit.flaw_sigma[flaw] / (is_rad ? degree : 1.0));
   }
   return fmt::format(
-      "# {} per unit of command; sigma: gain {:.3g}, tau {:.3g} s, delay {:.3g} s{}\n"
-      "plant: {{kind: {}, gain: {:.9g}, unit: rad, tau_s: {:.9g}, command_delay_s: {:.9g}{}}}\n",
-      is_angle ? "rad" : "rad/s", sigma[0], sigma[1], sigma[2], flaw_sigmas, is_angle ? "angle" : "rate", fit.params[0],
-      fit.params[1], fit.params[2], flaws);
+      "# {} per unit of command{}{}\n"
+      "plant: {{kind: {}, gain: {:.9g}, unit: rad, tau_s: {:.9g}, command_delay_s: {:.9g}{}, "
+      "sigma_gain: {:.3g}, sigma_tau_s: {:.3g}, sigma_command_delay_s: {:.3g}}}\n",
+      is_angle ? "rad" : "rad/s",
+      flaw_sigmas.empty() ? "" : "; sigma: ", flaw_sigmas.empty() ? "" : flaw_sigmas.substr(2),
+      is_angle ? "angle" : "rate", fit.params[0], fit.params[1], fit.params[2], flaws, sigma[0], sigma[1], sigma[2]);
 }
 
 }  // namespace alidade

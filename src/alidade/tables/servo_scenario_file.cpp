@@ -123,9 +123,10 @@ void read_gain(const Section& section, const FieldList& described, auto& plant) 
 }
 
 void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenario) {
-  const Section section(root, top, "plant",
-                        {"kind", "gain", "unit", "tau_s", "max_rate_deg_s", "max_acceleration_deg_s2",
-                         "command_delay_s", "dead_band", "backlash_deg", "second_tau_s", "pan_deg", "tilt_deg"});
+  const Section section(
+      root, top, "plant",
+      {"kind", "gain", "unit", "tau_s", "max_rate_deg_s", "max_acceleration_deg_s2", "command_delay_s", "dead_band",
+       "backlash_deg", "second_tau_s", "pan_deg", "tilt_deg", "sigma_gain", "sigma_tau_s", "sigma_command_delay_s"});
   bool is_rate_plant = false;
   section.word(
       "kind", is_rate_plant,
@@ -152,6 +153,10 @@ void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenar
     section.number("max_acceleration_deg_s2", plant.max_acceleration_rad_s2, described, degree);
   }
   section.number("command_delay_s", axis.command_delay_s, described);
+  PlantSigma& sigma = scenario.scene.plant_sigma;
+  section.number("sigma_gain", sigma.gain, described);
+  section.number("sigma_tau_s", sigma.tau_s, described);
+  section.number("sigma_command_delay_s", sigma.command_delay_s, described);
   section.number("dead_band", axis.dead_band, described);
   section.number("backlash_deg", axis.backlash_rad, described, degree);
   section.number("second_tau_s", axis.second_tau_s, described);
@@ -369,7 +374,8 @@ latency_s: 0                     # from an image to its pixel
 plant: {kind: angle, gain: 0.0567, unit: deg, tau_s: 0.1, command_delay_s: 0}
 # plant: {kind: angle, gain: 1, tau_s: 0.06, max_rate_deg_s: 40, max_acceleration_deg_s2: 120}  # as `head --identify` has
 # plant: {kind: rate, gain: 1, unit: rad, tau_s: 0.05, max_rate_deg_s: 180, max_acceleration_deg_s2: 1500,
-#         pan_deg: [-170, 170], tilt_deg: [-30, 90], dead_band: 0, backlash_deg: 0, second_tau_s: 0}
+#         pan_deg: [-170, 170], tilt_deg: [-30, 90], dead_band: 0, backlash_deg: 0, second_tau_s: 0,
+#         sigma_gain: 0, sigma_tau_s: 0, sigma_command_delay_s: 0}  # as `identify` has them: loops are stable within 3
 mismatch: {gain: 1, tau: 1}      # the plant as it is, over the plant as it is known
 noise: {sigma_px: 0.5, sigma_encoder_deg: 0.05, encoder_step_deg: 0}
 controllers: [pi, feedforward, lqr, mpc]

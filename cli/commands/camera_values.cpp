@@ -22,11 +22,10 @@ void add_camera_input(Run& run, const std::filesystem::path& file) {
 void add_rig_input(Run& run, const std::filesystem::path& file) {
   run.add_input("rig", file);
   for (const std::filesystem::path& camera : camera_files_of_rig(file)) add_camera_input(run, camera);
-  for (const std::string& changed : changed_cameras_of_rig(file))
-    run.add_doubt(file.string() + ": " + changed,
-                  "calibrate the rig again with that camera (alidade rig); or, if it is meant, remove camera_values of "
-                  "that head from " +
-                      file.string());
+}
+
+void add_rig_doubts(Run& run, const Rig& rig) {
+  for (const std::string& doubt : rig.doubts) run.add_doubt(doubt, rig_doubts_remedy);
 }
 
 Camera read_camera_input(Run& run, const std::filesystem::path& file) {

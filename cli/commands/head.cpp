@@ -305,6 +305,7 @@ ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   LiveRun live(args.live, run);
   const Rig rig = read_rig(args.rig);
   add_rig_input(run, args.rig);
+  add_rig_doubts(run, rig);
   if (rig.heads.size() != 1) throw InputError(args.rig + ": one head is followed with; this rig has another number");
   load_look(args.look);
   const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device, options_of(args));

@@ -59,6 +59,7 @@ ExitCode project_beam(ProjectArgs args, Run& run) {
 ExitCode project_heads(const ProjectArgs& args, Run& run) {
   const Rig rig = read_rig(args.rig);
   add_rig_input(run, args.rig);
+  add_rig_doubts(run, rig);
   if (!rig.intrinsics_histories.empty())
     throw InputError(args.rig.string() + ": intrinsics: change with time, which `project` is not given; give a camera");
   std::optional<Eigen::Vector3d> point_in_world;

@@ -72,6 +72,7 @@ ExitCode run_servo_command(const ServoArgs& args, Run& run) {
   run.add_input("scenario", args.scenario);
   const ServoScenarioFile read = read_servo_scenario(args.scenario);
   if (!read.rig.empty()) add_rig_input(run, read.rig);
+  for (const std::string& doubt : read.rig_doubts) run.add_doubt(doubt, rig_doubts_remedy);
   if (!read.track.empty()) run.add_input("track", read.track);
   const ServoScenario scenario = with_options(read.scenario, args);
   run.lap("read");

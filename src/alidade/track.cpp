@@ -147,6 +147,16 @@ void judge_track(const FollowConfig& follow, TargetTrack& result) {
   heed_assumptions(result.assumed, result.verdict);
 }
 
+void heed_doubts(const Rig& rig, Verdict& verdict) {
+  for (const std::string& doubt : rig.doubts) {
+    const bool has_cause = verdict.state != State::good;
+    heed({.name = "inputs", .state = State::care, .text = doubt}, rig_doubts_remedy, verdict);
+    if (!has_cause) continue;
+    verdict.sentence += "; " + doubt;  // which may explain it
+    verdict.to_add = rig_doubts_remedy;
+  }
+}
+
 }  // namespace
 
 std::string intrinsics_history_fault(const std::vector<TargetObservation>& observations, const Rig& rig) {
@@ -194,6 +204,7 @@ TargetTrack track(std::vector<TargetObservation> observations, Rig rig, const Tr
     follow.tracker.sigma_px = result.sigma_px;
     judge_track(follow, result);
   }
+  if (result.verdict.exit_code == ExitCode::ok) heed_doubts(result.rig, result.verdict);
   result.counts.used = result.num_used;
   result.counts.dropped = result.counts.given - result.num_used;
   return result;

@@ -265,6 +265,14 @@ std::string lens_change(const Camera& camera, const std::vector<double>& calibra
                      values[static_cast<Eigen::Index>(most)], calibrated[most]);
 }
 
+/// `camera_values`: the lens that the rig was calibrated with, beside the name of its file.
+void note_changed_camera(const YAML::Node& node, std::size_t index, const std::filesystem::path& file, Rig& rig) {
+  const Fields fields(node, file.string(), fmt::format("heads[{}].", index));
+  if (!fields.has("camera_values") || !node["camera"].IsScalar()) return;
+  const std::string change = lens_change(rig.heads[index].camera, fields.numbers("camera_values"));
+  if (!change.empty()) rig.doubts.push_back(fmt::format("{}: {}{}", file.string(), fields.text("camera"), change));
+}
+
 }  // namespace
 
 std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) {
@@ -291,6 +299,7 @@ Rig read_rig(const std::filesystem::path& file) {
     rig.heads.push_back(head_of(node, i, file));
     rig.encoder_errors.push_back(encoder_error_of(node, file.string(), i));
     read_intrinsics_history_of(node, i, file, rig);
+    note_changed_camera(node, i, file, rig);
     for (std::size_t k = 0; k < i; ++k) {
       if (rig.heads[k].head.id == rig.heads[i].head.id)
         refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} appears twice", rig.heads[i].head.id));
@@ -308,21 +317,6 @@ std::vector<std::filesystem::path> camera_files_of_rig(const std::filesystem::pa
     if (camera.IsDefined() && camera.IsScalar()) files.push_back(file.parent_path() / camera.as<std::string>());
   }
   return files;
-}
-
-std::vector<std::string> changed_cameras_of_rig(const std::filesystem::path& file) {
-  const YAML::Node heads = detail::load_yaml(read_file(file), file.string())["heads"];
-  std::vector<std::string> changed;
-  for (std::size_t i = 0; heads.IsDefined() && heads.IsSequence() && i < heads.size(); ++i) {
-    if (!heads[i].IsMap() || !heads[i]["camera"] || !heads[i]["camera"].IsScalar()) continue;
-    const YAML::Node head = heads[i];
-    const Fields fields(head, file.string(), fmt::format("heads[{}].", i));
-    if (!fields.has("camera_values")) continue;
-    const Camera camera = read_central_camera(file.parent_path() / fields.text("camera"));
-    const std::string change = lens_change(camera, fields.numbers("camera_values"));
-    if (!change.empty()) changed.push_back(fields.text("camera") + change);
-  }
-  return changed;
 }
 
 std::map<int, Camera> read_cameras_by_head(const std::vector<std::filesystem::path>& files, const std::vector<int>& ids,

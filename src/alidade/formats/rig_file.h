@@ -18,15 +18,13 @@ ALIDADE_PUBLIC_BEGIN
 
 /// Reads it. A camera's file name is relative to the rig's file; what is not there is zero or identity. Throws
 /// InputError: a key that is unknown, missing or no number, a quaternion that is no rotation, an encoder's angle that
-/// looks like degrees, two heads of one id, something that is no covariance. A head's `intrinsics` is read along.
+/// looks like degrees, two heads of one id, something that is no covariance. A head's `intrinsics` is read along. A
+/// camera file that is not what the rig was calibrated with (`camera_values` of a head, where it is there) is in its
+/// doubts: "rig.yaml: camera_1.yaml has fx 905.1, but the rig was calibrated with 900.6".
 [[nodiscard]] Rig read_rig(const std::filesystem::path& file);
 
 /// The camera files that it names, in the order of its heads; of what read_rig() refuses perhaps none.
 [[nodiscard]] std::vector<std::filesystem::path> camera_files_of_rig(const std::filesystem::path& file);
-
-/// Camera files that are not what the rig was calibrated with (`camera_values` of a head, where it is there), each with
-/// what differs: "camera_1.yaml has fx 905.1, but the rig was calibrated with 900.6".
-[[nodiscard]] std::vector<std::string> changed_cameras_of_rig(const std::filesystem::path& file);
 
 /// Reads the camera of each head of a table: one file for all, or one for each head in the order of `ids`. Throws
 /// InputError: another number of files (`table` is named), a camera that cannot be read or is not central.

@@ -28,7 +28,13 @@ struct Rig {
   Eigen::MatrixXd cov_with_lenses;
   std::vector<EncoderError> encoder_errors;             ///< One per head, or none.
   std::vector<IntrinsicsHistory> intrinsics_histories;  ///< One per head, or none: of cameras that zoom.
+  /// What read_rig() found that is not as it was when the rig was calibrated: no answer by it is good.
+  std::vector<std::string> doubts;
 };
+
+/// What to do about a rig's doubts.
+inline constexpr const char* rig_doubts_remedy =
+    "calibrate the rig again with that camera (alidade rig); or, if it is meant, remove camera_values of that head";
 
 /// What is wrong with a head or a rig that a program made, in one sentence; empty where nothing is.
 [[nodiscard]] std::string fault(const RigHead& rig_head);

@@ -348,6 +348,7 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
       refuse(read.rig.string(), "intrinsics", "is for `alidade track`; a scenario says `zoom` and `intrinsics` itself");
     read.scenario.scene.heads = rig.heads;
     read.scenario.scene.rig_errors = rig_uncertainty(rig);
+    read.rig_doubts = rig.doubts;
   }
   read_target(root, top, read, file.parent_path());
   read_plant(root, top, read.scenario);

@@ -11,8 +11,9 @@ ALIDADE_PUBLIC_BEGIN
 
 struct ServoScenarioFile {
   ServoScenario scenario;
-  std::filesystem::path rig;    ///< As the scenario names it, from its own folder; empty: the preset's.
-  std::filesystem::path track;  ///< The target's path, if it was recorded; likewise.
+  std::filesystem::path rig;            ///< As the scenario names it, from its own folder; empty: the preset's.
+  std::vector<std::string> rig_doubts;  ///< Of a Rig.
+  std::filesystem::path track;          ///< The target's path, if it was recorded; likewise.
 };
 
 /// Reads scenario.yaml; what is omitted is the preset. Throws InputError: a key that is unknown or no number, a value

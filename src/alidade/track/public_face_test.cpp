@@ -101,6 +101,22 @@ TEST(TrackFace, OneByOneIsTheSame) {
   }
 }
 
+/// What read_rig() found of a rig's file is heeded by what tracks with it, at once and in a stream.
+TEST(TrackFace, ARigInDoubtMakesNoGoodTrack) {
+  const TrackScene scene = *track_scenario("B");
+  const auto observations = testing::observations_of(scene, 5);
+  const TrackConfig config{.sigma_a_m_s2 = scene.sigma_a_m_s2};
+  Rig rig = rig_of(scene);
+  rig.doubts.emplace_back("rig.yaml: camera.yaml has fx 905, but the rig was calibrated with 900");
+  TargetTracker tracker(rig, config);
+  for (const TargetObservation& observation : observations) (void)tracker.push(observation);
+  for (const Verdict& verdict : {track(observations, rig, config).verdict, tracker.finish().verdict}) {
+    EXPECT_EQ(verdict.state, State::care);
+    EXPECT_EQ(verdict.checks.back().text, rig.doubts[0]);
+    EXPECT_EQ(verdict.checks.back().state, State::care);
+  }
+}
+
 /// A stream without end keeps its newest rows: the result is that of the batch call for them, which is reported.
 TEST(TrackFace, OfALongStreamTheNewestRowsAreKept) {
   const TrackScene scene = *track_scenario("B");

@@ -214,7 +214,14 @@ struct TargetTracker::State {
   Rig rig;
   TrackConfig config;
   std::variant<Tracker, XiahouTracker> tracker;
+  RecentReadings readings;
   std::vector<TargetObservation> observations;
+
+  /// The angles' delay, as track() counts it.
+  void count_delay(double t_s, Belief<6>& belief) const {
+    if (config.sigma_clock_s && *config.sigma_clock_s > 0.0 && std::holds_alternative<Tracker>(tracker))
+      readings.count_delay(rig.heads, *config.sigma_clock_s, t_s, belief);
+  }
   std::size_t num_forgotten = 0;
 };
 
@@ -233,7 +240,8 @@ std::variant<Tracker, XiahouTracker> tracker_for(const Rig& rig, const TrackConf
 }  // namespace
 
 TargetTracker::TargetTracker(Rig rig, const TrackConfig& config)
-    : state_(std::make_unique<State>(State{rig, config, tracker_for(rig, config), {}, 0})) {}
+    : state_(std::make_unique<State>(
+          State{rig, config, tracker_for(rig, config), RecentReadings(rig.heads.size()), {}, 0})) {}
 TargetTracker::~TargetTracker() = default;
 TargetTracker::TargetTracker(TargetTracker&&) noexcept = default;
 TargetTracker& TargetTracker::operator=(TargetTracker&&) noexcept = default;
@@ -243,12 +251,16 @@ TrackStep TargetTracker::push(const TargetObservation& observation) {
   if (!fault.empty()) throw ConfigError("the observation " + fault);
   state_->observations.push_back(observation);
   state_->num_forgotten += forget_oldest(state_->observations, static_cast<std::size_t>(state_->config.keep_rows));
-  return std::visit([&](auto& tracker) { return tracker.take(observation); }, state_->tracker);
+  TrackStep step = std::visit([&](auto& tracker) { return tracker.take(observation); }, state_->tracker);
+  state_->readings.add(observation);
+  if (step.has_belief) state_->count_delay(step.t_s, step.belief);
+  return step;
 }
 
 std::optional<PredictedStep> TargetTracker::at(double t_s) const {
   const Tracker* tracker = std::get_if<Tracker>(&state_->tracker);
-  const auto belief = tracker != nullptr ? tracker->at(t_s) : std::nullopt;
+  auto belief = tracker != nullptr ? tracker->at(t_s) : std::nullopt;
+  if (belief) state_->count_delay(t_s, *belief);
   return belief ? std::optional(PredictedStep{t_s, true, *belief}) : std::nullopt;
 }
 

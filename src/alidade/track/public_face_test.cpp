@@ -117,6 +117,27 @@ TEST(TrackFace, ARigInDoubtMakesNoGoodTrack) {
   }
 }
 
+/// The delay of the angles that --sigma-clock states is in each row as it comes.
+TEST(TrackFace, AStreamCountsTheAnglesDelay) {
+  const TrackScene scene = *track_scenario("B");
+  const auto observations = testing::observations_of(scene, 5);
+  const TrackConfig config{.sigma_a_m_s2 = scene.sigma_a_m_s2, .sigma_px = 0.5, .sigma_clock_s = 0.01};
+  TargetTracker tracker(rig_of(scene), config);
+  const TargetTrack batch = track(observations, rig_of(scene), config);
+  ASSERT_EQ(batch.inflation, 1.0);
+  double off2 = 0.0, num = 0.0;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const TrackStep step = tracker.push(observations[i]);
+    if (!step.has_belief || i < observations.size() / 4) continue;
+    for (int k = 0; k < 3; ++k) {
+      const double ratio = step.belief.P(k, k) / batch.steps[i].belief.P(k, k);
+      off2 += (ratio - 1.0) * (ratio - 1.0), num += 1.0;
+    }
+  }
+  ASSERT_GT(num, 100.0);
+  EXPECT_LT(std::sqrt(off2 / num), 0.15);  // rates from what has been read until then
+}
+
 /// A stream without end keeps its newest rows: the result is that of the batch call for them, which is reported.
 TEST(TrackFace, OfALongStreamTheNewestRowsAreKept) {
   const TrackScene scene = *track_scenario("B");

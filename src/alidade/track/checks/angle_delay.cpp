@@ -35,15 +35,19 @@ class ReadingLog {
     return nearest;
   }
 
-  /// How fast a head's readings change about that time [rad/s], from the readings beside it.
+  /// How fast a head's readings change about that time [rad/s], from the readings beside it; from the last two where
+  /// it is the last.
   [[nodiscard]] Eigen::Vector2d rate(std::size_t head, double t_s) const {
     const auto& readings = of_head_[head];
-    const auto before = std::ranges::lower_bound(readings, t_s, {}, &Reading::t_s);
-    const auto after = std::ranges::upper_bound(readings, t_s, {}, &Reading::t_s);
-    if (before == readings.begin() || after == readings.end()) return Eigen::Vector2d::Zero();
-    const double apart_s = after->t_s - (before - 1)->t_s;
-    if (apart_s > near_s) return Eigen::Vector2d::Zero();
-    return (after->pan_tilt_rad - (before - 1)->pan_tilt_rad) / apart_s;
+    auto before = std::ranges::lower_bound(readings, t_s, {}, &Reading::t_s);
+    auto after = std::ranges::upper_bound(readings, t_s, {}, &Reading::t_s);
+    if (after == readings.end() && after != readings.begin()) --after;
+    before = std::min(before, after);
+    if (before != readings.begin()) --before;
+    if (after == before) return Eigen::Vector2d::Zero();
+    const double apart_s = after->t_s - before->t_s;
+    if (!(apart_s > 0.0 && apart_s < near_s)) return Eigen::Vector2d::Zero();
+    return (after->pan_tilt_rad - before->pan_tilt_rad) / apart_s;
   }
 
  private:
@@ -175,6 +179,23 @@ void count_angle_delay(std::span<const TargetObservation> observations, std::spa
   for (TrackStep& step : report.steps) widen(moves, step.t_s, step.belief);
   for (PredictedStep& step : report.ahead) widen(moves, step.t_s, step.belief);
   for (PredictedStep& step : report.smoothed) widen(moves, step.t_s, step.belief);
+}
+
+void RecentReadings::add(const TargetObservation& observation) {
+  std::vector<TargetObservation>& own = of_head_[observation.head];
+  const auto at = std::ranges::upper_bound(own, observation.t_capture_s, {}, &TargetObservation::t_capture_s);
+  own.insert(at, observation);
+  if (own.size() > 2) own.erase(own.begin());
+}
+
+void RecentReadings::count_delay(std::span<const RigHead> heads, double sigma_s, double t_s, Belief<6>& belief) const {
+  std::vector<TargetObservation> recent;
+  for (const auto& own : of_head_) recent.insert(recent.end(), own.begin(), own.end());
+  TrackStep step;
+  step.t_s = t_s;
+  step.belief = belief;
+  if (const auto moved = moved_by_delay(ReadingLog(recent, heads.size()), heads, step, sigma_s))
+    belief.P.topLeftCorner<3, 3>() += *moved * moved->transpose();
 }
 
 }  // namespace alidade

@@ -50,4 +50,16 @@ struct HeadReading {
 void count_angle_delay(std::span<const TargetObservation> observations, std::span<const RigHead> heads, double sigma_s,
                        TrackReport& report);
 
+/// What heads have read last: count_angle_delay() of a step as it comes.
+class RecentReadings {
+ public:
+  explicit RecentReadings(std::size_t num_heads) : of_head_(num_heads) {}
+  void add(const TargetObservation& observation);
+  /// Increases the covariance of a belief of that time.
+  void count_delay(std::span<const RigHead> heads, double sigma_s, double t_s, Belief<6>& belief) const;
+
+ private:
+  std::vector<std::vector<TargetObservation>> of_head_;  ///< The last two, in order of capture.
+};
+
 }  // namespace alidade

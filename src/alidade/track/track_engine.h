@@ -52,7 +52,9 @@ class TrackEngine {
     if (count_ == 0 || !newest().has_started || !(t_s >= newest().observation.t_capture_s)) return std::nullopt;
     Filter filter = newest().filter;
     filter.predict(models_, t_s - newest().observation.t_capture_s);
-    return filter.estimate();
+    Belief<6> belief = filter.estimate();
+    count_range_drift(newest(), t_s, belief);
+    return belief;
   }
 
   [[nodiscard]] std::optional<Tracker::Smoothed> smoothed(double lag_s) const {
@@ -142,7 +144,24 @@ class TrackEngine {
     if (count_ == 0) return;
     step.t_s = newest().observation.t_capture_s;
     step.has_belief = newest().has_started;
-    if (step.has_belief) step.belief = newest().filter.estimate();
+    if (!step.has_belief) return;
+    step.belief = newest().filter.estimate();
+    count_range_drift(newest(), step.t_s, step.belief);
+  }
+
+  /// Nothing corrects the range while one head alone sees the target: an acceleration that lasts moves it along that
+  /// head's rays, more than the white one of the models does.
+  void count_range_drift(const Entry& last, double t_s, Belief<6>& belief) const {
+    if (config_.method != TargetMotion::cv && config_.method != TargetMotion::turn) return;
+    if (!(last.t_head_s - last.t_other_s > one_head_after_s)) return;
+    const double alone_s = t_s - last.t_other_s, alone_s2 = alone_s * alone_s;
+    const double counted_before = std::pow(one_head_after_s, 4) / (alone_s2 * alone_s2);
+    const auto ray = ray_in_world(heads_[last.observation.head], last.observation);
+    if (!ray) return;
+    Eigen::Vector<double, 6> drift;
+    drift << 0.5 * alone_s2 * ray->direction_in_world, alone_s * ray->direction_in_world;
+    drift *= config_.sigma_a_m_s2;
+    belief.P += (1.0 - counted_before) * drift * drift.transpose();
   }
 
   /// The outcome of the observation at this index, given the entry before it.

@@ -28,6 +28,7 @@ struct TargetObservation {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.0;  ///< Of one coordinate of this observation; 0: that of all.
   std::optional<ObservationLens> lens = {};
+  Eigen::Vector2d turns = Eigen::Vector2d::Zero();  ///< That were taken off the readings, whole ones.
 };
 
 [[nodiscard]] inline double sigma_px_of(const TargetObservation& observation, double of_all_px) {

@@ -1,5 +1,8 @@
 #include "alidade/tables/logs/events_stream.h"
 
+#include <cmath>
+#include <numbers>
+
 #include "alidade/files/table_rows.h"
 #include "alidade/pantilt/head_view.h"
 #include "alidade/tables/logs/head_column.h"
@@ -80,7 +83,9 @@ TargetObservation EventRows::read(const Csv& csv, std::size_t row) {
   if (seen_s.size() > max_kept) seen_s.erase(seen_s.begin());
   for (int axis = 0; axis < 2; ++axis) {  // encoders that begin again after a turn
     double& last_rad = last_rad_[observation.head][axis];
-    last_rad = observation.pan_tilt_rad[axis] = reading_after(observation.pan_tilt_rad[axis], last_rad);
+    const double reading_rad = observation.pan_tilt_rad[axis];
+    last_rad = observation.pan_tilt_rad[axis] = reading_after(reading_rad, last_rad);
+    observation.turns[axis] = std::round((reading_rad - last_rad) / (2.0 * std::numbers::pi));
   }
   std::optional<Eigen::Vector2d>& stood_rad = first_rad_[observation.head];
   if (!stood_rad) stood_rad = observation.pan_tilt_rad;

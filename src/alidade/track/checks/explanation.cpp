@@ -3,9 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <numbers>
 #include <vector>
 
 #include "alidade/estimation/verdict.h"
@@ -45,11 +43,6 @@ namespace {
 
 using Observations = std::vector<TargetObservation>;
 
-struct Hypothesis {
-  Explanation explanation;
-  std::function<void(TargetObservation&)> apply;
-};
-
 std::string head_name(std::span<const RigHead> heads, std::size_t head) {
   return "head " + std::to_string(heads[head].head.id);
 }
@@ -57,36 +50,36 @@ std::string head_name(std::span<const RigHead> heads, std::size_t head) {
 using Change = std::function<void(TargetObservation&)>;
 
 /// Of one head's observations, or of all.
-Hypothesis hypothesis_of(std::optional<std::size_t> head, const std::string& what, const std::string& to_do,
-                         const Change& change) {
+TableMisreading misreading_of(std::optional<std::size_t> head, const std::string& what, const std::string& to_do,
+                              const Change& change) {
   return {{what, to_do}, [head, change](TargetObservation& observation) {
             if (!head || observation.head == *head) change(observation);
           }};
 }
 
 /// The signs of one head, or of all.
-void add_signs(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
+void add_signs(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<TableMisreading>& all) {
   const std::string of = head ? " of " + head_name(heads, *head) : "";
-  all.push_back(hypothesis_of(head, "pan" + of + " with the wrong sign",
+  all.push_back(misreading_of(head, "pan" + of + " with the wrong sign",
                               "pan > 0 turns left: with the sign reversed the events fit the rig",
                               [](TargetObservation& observation) { observation.pan_tilt_rad.x() *= -1.0; }));
-  all.push_back(hypothesis_of(head, "tilt" + of + " with the wrong sign",
+  all.push_back(misreading_of(head, "tilt" + of + " with the wrong sign",
                               "tilt > 0 turns up: with the sign reversed the events fit the rig",
                               [](TargetObservation& observation) { observation.pan_tilt_rad.y() *= -1.0; }));
 }
 
 /// The mirrors of one head, or of all.
-void add_mirrors(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
+void add_mirrors(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<TableMisreading>& all) {
   const auto mirrored = [heads](TargetObservation& observation, int axis) {
     const Camera& camera = heads[observation.head].camera;
     observation.px[axis] = (axis == 0 ? camera.width_px : camera.height_px) - 1.0 - observation.px[axis];
   };
   const std::string images = "the images of " + (head ? head_name(heads, *head) : "all heads");
-  all.push_back(hypothesis_of(head, images + " are mirrored", "mirror u: then the events fit the rig",
+  all.push_back(misreading_of(head, images + " are mirrored", "mirror u: then the events fit the rig",
                               [mirrored](TargetObservation& observation) { mirrored(observation, 0); }));
-  all.push_back(hypothesis_of(head, images + " are flipped upside down", "mirror v: then the events fit the rig",
+  all.push_back(misreading_of(head, images + " are flipped upside down", "mirror v: then the events fit the rig",
                               [mirrored](TargetObservation& observation) { mirrored(observation, 1); }));
-  all.push_back(hypothesis_of(head, images + " are rotated by half a turn",
+  all.push_back(misreading_of(head, images + " are rotated by half a turn",
                               "that camera hangs upside down: mirror u and v, or say so in the rig's cam_from_tilt",
                               [mirrored](TargetObservation& observation) {
                                 mirrored(observation, 0);
@@ -95,25 +88,24 @@ void add_mirrors(std::span<const RigHead> heads, std::optional<std::size_t> head
 }
 
 /// Columns that are named as one another, of one head, or of all.
-void add_exchanges(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
+void add_exchanges(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<TableMisreading>& all) {
   const std::string of = head ? " of " + head_name(heads, *head) : "";
-  all.push_back(hypothesis_of(
+  all.push_back(misreading_of(
       head, "pan and tilt" + of + " exchanged", "exchange pan_rad and tilt_rad: then the events fit the rig",
       [](TargetObservation& observation) { std::swap(observation.pan_tilt_rad.x(), observation.pan_tilt_rad.y()); }));
-  all.push_back(hypothesis_of(
+  all.push_back(misreading_of(
       head, "u and v" + of + " exchanged", "exchange u_px and v_px (row and column): then the events fit the rig",
       [](TargetObservation& observation) { std::swap(observation.px.x(), observation.px.y()); }));
 }
 
-void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
+void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<TableMisreading>& all) {
   add_signs(heads, head, all);
   add_mirrors(heads, head, all);
 }
 
-std::vector<Hypothesis> hypotheses(std::span<const RigHead> heads) {
-  std::vector<Hypothesis> all;
-  all.push_back({{"angles in degrees", "give pan_rad and tilt_rad in radians: as degrees they fit the rig"},
-                 [](TargetObservation& observation) { observation.pan_tilt_rad *= std::numbers::pi / 180.0; }});
+std::vector<TableMisreading> misreadings(const Observations& given, std::span<const RigHead> heads,
+                                         const FollowConfig& config, bool fits) {
+  std::vector<TableMisreading> all = misread_units(given, heads, config.tracker.together_s, fits);
   const std::size_t num = std::min<std::size_t>(heads.size(), 4);
   for (std::size_t a = 0; a < num; ++a)
     for (std::size_t b = a + 1; b < num; ++b)
@@ -182,16 +174,16 @@ struct Likelier {
   Observations observations;  ///< As they would be.
 };
 
-/// The hypothesis under which observations fit and are by far more probable; two of them where they are nearly alike.
+/// The misreading without which observations fit and are by far more probable; two of them where they are nearly alike.
 std::optional<Likelier> likeliest(const Observations& given, std::span<const RigHead> heads, const FollowConfig& config,
-                                  std::span<const Hypothesis> all) {
+                                  std::span<const TableMisreading> all) {
   constexpr std::size_t first_observations = 160;
   constexpr double min_gain = 30.0, of_gain = 0.03;  // no motion model is right to more
   const double as_given = tried(given, heads, config).ln_p;
   std::vector<Likelier> fitting;
-  for (const Hypothesis& hypothesis : all) {
+  for (const TableMisreading& misreading : all) {
     Observations changed = given;
-    for (TargetObservation& observation : changed) hypothesis.apply(observation);
+    for (TargetObservation& observation : changed) misreading.undo(observation);
     changed = with_shift(changed, {});
     // What does not fit a few hundred observations does not fit all of them.
     const Observations some(
@@ -199,7 +191,7 @@ std::optional<Likelier> likeliest(const Observations& given, std::span<const Rig
     if (changed.size() > 2 * first_observations && !tried(some, heads, config).fits) continue;
     const Trial trial = tried(changed, heads, config);
     if (trial.fits && trial.ln_p > as_given + min_gain)
-      fitting.push_back({trial.ln_p, hypothesis.explanation, std::move(changed)});
+      fitting.push_back({trial.ln_p, misreading.explanation, std::move(changed)});
   }
   if (fitting.empty()) return std::nullopt;
   std::ranges::stable_sort(fitting, std::ranges::greater{}, &Likelier::ln_p);
@@ -234,23 +226,28 @@ double ln_p_of_rivals(const Observations& given, std::span<const RigHead> heads,
 
 }  // namespace
 
-std::optional<Explanation> mirrored_images(std::span<const TargetObservation> observations,
-                                           std::span<const RigHead> heads, const FollowConfig& config,
-                                           std::span<const RigFault> faults) {
-  std::vector<Hypothesis> all;
-  add_turned(heads, std::nullopt, all);  // tilt of heads side by side that counts downwards does what flipped images do
-  for (std::size_t head = 0; head < std::min<std::size_t>(heads.size(), 4); ++head) add_mirrors(heads, head, all);
+std::optional<Explanation> misread_table(std::span<const TargetObservation> observations,
+                                         std::span<const RigHead> heads, const FollowConfig& config,
+                                         std::span<const RigFault> faults) {
+  std::vector<TableMisreading> mirrors;
+  add_turned(heads, std::nullopt, mirrors);  // tilt of heads side by side that counts downwards does what flips do
+  for (std::size_t head = 0; head < std::min<std::size_t>(heads.size(), 4); ++head) add_mirrors(heads, head, mirrors);
   const Observations given = some_of(observations, heads);
-  auto best = likeliest(given, heads, config, all);
-  if (!best || !(ln_p_of(best->observations, heads, config) > ln_p_of_rivals(given, heads, config, faults) + clear))
-    return std::nullopt;
-  return std::move(best->explanation);
+  std::optional<double> rivals;
+  for (const std::vector<TableMisreading>& tried_now : {mirrors, misreadings(given, heads, config, /*fits=*/true)}) {
+    auto best = likeliest(given, heads, config, tried_now);
+    if (!best) continue;
+    if (!rivals) rivals = ln_p_of_rivals(given, heads, config, faults);
+    if (ln_p_of(best->observations, heads, config) > *rivals + clear) return std::move(best->explanation);
+  }
+  return std::nullopt;
 }
 
 std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
-                                          std::span<const RigHead> heads, const FollowConfig& config) {
+                                          std::span<const RigHead> heads, const FollowConfig& config, bool fits) {
   const Observations given = some_of(observations, heads);
-  if (auto best = likeliest(given, heads, config, hypotheses(heads))) return std::move(best->explanation);
+  if (auto best = likeliest(given, heads, config, misreadings(given, heads, config, fits)))
+    return std::move(best->explanation);
   return foreign_head(given, heads, config);
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "alidade/estimation/verdict.h"
 #include "alidade/track/track.h"
@@ -17,6 +19,22 @@ struct Explanation {
   bool is_foreign_head = false;  ///< One head agrees with none of the others: by its pose, or by its clock.
 };
 
+/// A mistake of the table of observations, and what undoes it.
+struct TableMisreading {
+  Explanation explanation;
+  std::function<void(TargetObservation&)> undo;
+};
+
+/// Angles in degrees or by another gear, pixels of images of another size, of all heads or of one: those that let the
+/// rays come nearest to one another. The observations are in order of capture. Where they fit as they are (`fits`) only
+/// such as make what is seen larger: what makes it smaller makes any noise smaller, and so more probable.
+[[nodiscard]] std::vector<TableMisreading> misread_units(std::span<const TargetObservation> observations,
+                                                         std::span<const RigHead> heads, double together_s, bool fits);
+
+/// Two heads whose rows have the same pixels, one after another: of one image table.
+[[nodiscard]] std::optional<Explanation> copied_pixels(std::span<const TargetObservation> observations,
+                                                       std::span<const RigHead> heads);
+
 /// How observations fare under a hypothesis, the target being as manoeuvring as suits them best.
 struct Trial {
   double ln_p = 0.0;  ///< But for a constant.
@@ -25,18 +43,20 @@ struct Trial {
 [[nodiscard]] Trial tried(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                           const FollowConfig& config);
 
-/// Images of all heads, or of one, that are mirrored, flipped or rotated by half a turn: heads that follow keep the
-/// target near the centre, so that mirrored observations nearly fit. None where the observations fit no better so, or
-/// where one of these explains them as well: `faults` of the rig, a clock, a target that falls.
-[[nodiscard]] std::optional<Explanation> mirrored_images(std::span<const TargetObservation> observations,
-                                                         std::span<const RigHead> heads, const FollowConfig& config,
-                                                         std::span<const RigFault> faults);
+/// Images of all heads, or of one, that are mirrored, flipped, rotated by half a turn or of another size, angles of
+/// another unit: heads that follow keep the target near the centre, so that mirrored observations nearly fit. None
+/// where the observations fit no better so, or where one of these explains them as well: `faults` of the rig, a clock,
+/// a target that falls.
+[[nodiscard]] std::optional<Explanation> misread_table(std::span<const TargetObservation> observations,
+                                                       std::span<const RigHead> heads, const FollowConfig& config,
+                                                       std::span<const RigFault> faults);
 
-/// Swapped heads, exchanged columns, a wrong sign of an angle or a mirrored image, of all heads or of one, degrees, a
+/// Swapped heads, exchanged columns, a wrong sign of an angle or a mirrored image, of all heads or of one, units, a
 /// head that is not the rig's: the one under which the observations fit and are the most probable. Two of them where
 /// they are nearly equally probable; none where none lets the observations fit.
 [[nodiscard]] std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
-                                                        std::span<const RigHead> heads, const FollowConfig& config);
+                                                        std::span<const RigHead> heads, const FollowConfig& config,
+                                                        bool fits);
 
 /// Two heads' numbers that are exchanged for a while: their rays meet there once each row is of the other head, and all
 /// observations fit then.

@@ -177,7 +177,7 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   const bool is_explained = is_explained_by_fault(report);
   if (report.num_starts > 0 && (is_doubtful(report) || report.num_restarts > 0 || report.jitter)) {
     causes.mistake = exchanged_rows(observations, heads, found);
-    if (!causes.mistake) causes.mistake = mirrored_images(observations, heads, found, alike_per_head(report));
+    if (!causes.mistake) causes.mistake = misread_table(observations, heads, found, alike_per_head(report));
     if (causes.mistake) return causes;
   }
   if (report.num_starts > 0) causes.coarse = coarse_readings(observations, heads, config);
@@ -193,7 +193,7 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   if (is_explained && !fits(report)) return causes;
   const bool is_odd = !fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected;
   const bool is_jitter = report.jitter && fits(report);
-  if (is_odd && !is_explained && !is_jitter) causes.mistake = explanation_of(observations, heads, config);
+  if (is_odd && !is_explained && !is_jitter) causes.mistake = explanation_of(observations, heads, config, fits(report));
   if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
   causes.shift = probable_clock_shift(observations, heads, found, rivals_of_clocks(report));
   // A head with a wrong clock agrees with none of the others, either.
@@ -323,7 +323,11 @@ void set_frozen_remedy(const TrackReport& report, std::span<const RigHead> heads
 
 Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation> observations,
                    std::span<const RigHead> heads, const FollowConfig& config, bool is_stated, std::size_t num_given) {
-  if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
+  if (auto copied = copied_pixels(observations, heads)) return refused(std::move(*copied));
+  if (auto other = other_camera(report, observations, heads)) {
+    const auto misread = explanation_of(observations, heads, config, /*fits=*/false);  // of larger images, or exchanged
+    return refused(misread ? *misread : std::move(*other));
+  }
   if (const auto unit = units_of_heads_times(observations, heads, config)) return refused({unit->text, unit_remedy});
   Causes causes = causes_of(report, observations, heads, config);
   if (!causes.mistake) causes.step_s = step_that_explains(observations, report, causes.shift);

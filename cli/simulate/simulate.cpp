@@ -14,6 +14,7 @@
 #include "cli/app/board_options.h"
 #include "cli/app/image_size.h"
 #include "cli/app/option_checks.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -29,10 +30,7 @@ struct BoardArgs {
 };
 
 Camera camera_from(const BoardArgs& args, Run& run) {
-  if (!args.camera_file.empty()) {
-    run.add_input("camera", args.camera_file);
-    return read_camera(args.camera_file);
-  }
+  if (!args.camera_file.empty()) return read_camera_input(run, args.camera_file);
   const auto [width, height] = image_size(args.size);
   auto camera = example_camera(args.model, width, height);
   if (!camera) throw UsageError("--model: '" + args.model + "' is not pinhole, brown, kannala_brandt or flat_port");

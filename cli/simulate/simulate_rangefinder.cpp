@@ -13,6 +13,7 @@
 #include "alidade/tables/shots_file.h"
 #include "cli/app/app.h"
 #include "cli/app/option_checks.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -39,8 +40,8 @@ RangefinderScene scene_of(const SimulateRangefinderArgs& args, Run& run) {
     throw UsageError(
         fmt::format("--scenario: '{}' is not one of {}", args.scenario, fmt::join(rangefinder_scenarios(), ", ")));
   if (!args.camera.empty()) {
-    run.add_input("camera", args.camera);
     config->camera = read_central_camera(args.camera);
+    add_camera_input(run, args.camera);
   }
   config->num_shots = args.shots.value_or(config->num_shots);
   config->beam.noise = {args.sigma_range_m, 0.0, 0.0};

@@ -98,6 +98,21 @@ TEST(SimulateBoard, NamesWhatIsWrong) {
   expect({"--camera", (folder.path() / "none.yaml").string()}, 3, "none.yaml");
 }
 
+/// FILE:NAME chooses one of a file's cameras, as everywhere.
+TEST(Simulate, ReadsOneOfAFilesCameras) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "pair.yml";
+  write_file(file,
+             "%YAML:1.0\n---\nimage_width: 320\nimage_height: 240\n"
+             "M1: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [300, 0, 160, 0, 300, 120, 0, 0, 1]\n"
+             "D1: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [0, 0, 0, 0, 0]\n"
+             "M2: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [310, 0, 160, 0, 310, 120, 0, 0, 1]\n"
+             "D2: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [0, 0, 0, 0, 0]\n");
+  const Outcome outcome = simulate_board(folder.path(), {"--camera", file.string() + ":M2", "--corners-only"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(params(read_camera(folder.path() / "truth_camera.yaml").lens)[0], 310.0);
+}
+
 TEST(Simulate, WithoutANameListsTheScenarios) {
   const Outcome outcome = testing::run_program({ALIDADE_EXECUTABLE, "simulate"});
   EXPECT_EQ(outcome.code, 2);

@@ -12,6 +12,7 @@
 #include "alidade/tables/localize_file.h"
 #include "cli/app/app.h"
 #include "cli/app/option_checks.h"
+#include "cli/commands/camera_values.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -114,8 +115,7 @@ Camera given_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
 
 ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   UnderwaterScene scene = args.scene;
-  scene.camera = args.camera.empty() ? underwater_camera() : read_camera(args.camera);
-  if (!args.camera.empty()) run.add_input("camera", args.camera);
+  scene.camera = args.camera.empty() ? underwater_camera() : read_camera_input(run, args.camera);
   scene.dt_s = 1.0 / args.rate_hz;
   const UnderwaterSequence sequence = simulate_underwater(scene, run.options.seed);
   std::vector<TimedPose> truth;

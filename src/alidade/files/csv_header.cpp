@@ -58,9 +58,18 @@ std::pair<std::string_view, std::string_view> name_and_brackets(std::string_view
   return {csv_trimmed(column.substr(0, open)), column.substr(open + 1, column.size() - open - 2)};
 }
 
+/// A column whose name never has its unit: "p12x [px]", "omega_x [rad/s]".
+bool is_named_without(std::string_view name, std::string_view unit) {
+  if (unit == "rad/s") return name.starts_with("omega_") && name.size() == 7;
+  const bool is_point =
+      unit == "px" && name.size() > 2 && name.starts_with('p') && (name.back() == 'x' || name.back() == 'y');
+  return is_point && std::ranges::all_of(name.substr(1, name.size() - 2), [](char c) { return c >= '0' && c <= '9'; });
+}
+
 std::string tidy_name(std::string_view column) {
   const auto [name, brackets] = name_and_brackets(column);
   const Unit* const unit = unit_called(csv_trimmed(brackets));
+  if (is_named_without(name, csv_trimmed(brackets))) return std::string(name);
   if (unit == nullptr) return std::string(column);
   const std::string_view ascii = unit->name == "°" ? "deg" : unit->name == "µs" ? "us" : unit->name;
   return std::string(name) + "_" + std::string(ascii);

@@ -102,6 +102,11 @@ TEST(Csv, ColumnsAreAskedForInSiUnitsWhateverTheirs) {
   EXPECT_NEAR(csv.number(0, "roll_rad"), std::numbers::pi, 1e-15);
   EXPECT_EQ(csv.number(0, "pan_deg"), 90.0) << "the column itself";
   EXPECT_EQ(csv.where(0, "pan_rad"), "x.csv:2: column 'pan_deg'");
+  const Csv points = Csv::parse("omega_x [rad/s],p1x [px],p12y[px],u[px]\n1,2,3,4\n", "x.csv");
+  EXPECT_EQ(points.number(0, "omega_x"), 1.0) << "names that never have their unit";
+  EXPECT_EQ(points.number(0, "p1x"), 2.0);
+  EXPECT_EQ(points.number(0, "p12y"), 3.0);
+  EXPECT_EQ(points.number(0, "u_px"), 4.0);
   EXPECT_FALSE(csv.has("t_deg"));
   EXPECT_FALSE(Csv::parse("t_ms,t_ns\n", "x.csv").has("t_s")) << "which of both is meant?";
   EXPECT_EQ(Csv::parse("t_s,t_ms\n1,5\n", "x.csv").number(0, "t_s"), 1.0);

@@ -88,29 +88,42 @@ std::string asked_of_lens(const FixedQuantity& thing) {
          text_of(thing.value, is_pixels ? 5 : 3);
 }
 
-/// A board that is bent so much that it is no flat board, by more than another lens would explain of the same.
-const ShotCause* bent_board(const RangefinderReport& report) {
-  constexpr double ask_beyond = 3.5, flat_m = 0.0003;
-  const auto bent = std::ranges::find(report.causes, "bent", &ShotCause::name);
-  if (bent == report.causes.end() || !(bent->sigmas > ask_beyond) || !(bent->size > flat_m)) return nullptr;
+constexpr double bend_beyond = 3.5, flat_m = 0.0003;
+
+/// By how many σ the shots ask for another lens.
+double lens_sigmas(const RangefinderReport& report) {
   double lens = 0.0;
   for (const FixedQuantity& thing : report.fixed)
     if (thing.name.starts_with("camera")) lens = std::max(lens, std::abs(thing.asked) / thing.asked_sigma);
   for (const FreedDistortion& one : report.freed_distortion)
     lens = std::max(lens, std::abs(one.value - one.was) / one.sigma);
-  return bent->sigmas > lens ? &*bent : nullptr;
+  return lens;
+}
+
+/// A board that is bent so much that it is no flat board, by more than another lens would explain of the same.
+const ShotCause* bent_board(const RangefinderReport& report) {
+  const auto bent = std::ranges::find(report.causes, "bent", &ShotCause::name);
+  if (bent == report.causes.end() || !(bent->sigmas > bend_beyond) || !(bent->size > flat_m)) return nullptr;
+  return bent->sigmas > lens_sigmas(report) ? &*bent : nullptr;
 }
 
 void add_bent_board(const RangefinderReport& report, Verdict& verdict) {
   const auto found = std::ranges::find(report.causes, "bent", &ShotCause::name);
   if (found == report.causes.end()) return;
-  const bool is_bent = bent_board(report) != nullptr;
-  verdict.checks.push_back(check_of("bent", is_bent ? State::care : State::good,
-                                    is_bent ? "the board is not flat: it bends by " + text_of(1e3 * found->size, 2) +
-                                                  " mm (" + text_of(found->sigmas, 2) +
-                                                  "σ), counted in σ: glue it to something flat"
-                                            : "no bend of the board is indicated that matters",
-                                    found->sigmas, 3.5, "σ", "residuals"));
+  const std::string bends = "by " + text_of(1e3 * found->size, 2) + " mm (" + text_of(found->sigmas, 2) + "σ)";
+  Check check =
+      check_of("bent", State::good, "no bend of the board is indicated", found->sigmas, bend_beyond, "σ", "residuals");
+  if (bent_board(report) != nullptr) {
+    check.state = State::care;
+    check.text = "the board is not flat: it bends " + bends + ", counted in σ: glue it to something flat";
+  } else if (found->sigmas > bend_beyond && found->size <= flat_m) {
+    check = check_of("bent", State::good, "the board bends " + bends + ", which is flat enough", 1e3 * found->size,
+                     1e3 * flat_m, "mm", "residuals");
+  } else if (found->sigmas > bend_beyond) {
+    check.text = "another lens explains more than a bend of the board " + bends + " would";
+    check.limit = lens_sigmas(report);
+  }
+  verdict.checks.push_back(std::move(check));
 }
 
 /// Terms of higher order look like k1 and k2.

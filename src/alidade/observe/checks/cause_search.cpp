@@ -1,6 +1,7 @@
 // Where several things are not as assumed at once, none of them explains much alone: sets of them are tried.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "alidade/observe/checks/cause_search.h"
 
@@ -21,7 +22,8 @@ const std::string scale_cause = "encoder scale", backlash_cause = "backlash", ze
                   attitude_cause = "attitude that drifts", clock_cause = "clock rate",
                   axes_cause = "axes that are not perpendicular";
 
-/// Simple ones first: of those that explain about as well the first is taken.
+/// Simple ones first: of those that explain about as well the first is taken. A lever has a depth for every point
+/// beside it, and one of a metre does what a lens and a mounting do.
 const std::vector<Trial>& trials() {
   static const std::vector<Trial> all{
       {.lens = true},
@@ -35,7 +37,6 @@ const std::vector<Trial>& trials() {
       {.errors = {axes_cause}},
       {.mount = true, .errors = {axes_cause}},
       {.mount = true, .delay = true},
-      {.lever = true},
       {.delay = true, .errors = {clock_cause}},
       {.delay = true, .shutter = true},
       {.delay = true, .errors = {backlash_cause}},
@@ -44,9 +45,10 @@ const std::vector<Trial>& trials() {
       {.lens = true, .errors = {backlash_cause}},
       {.lens = true, .errors = {scale_cause, rate_scale_cause}},
       {.lens = true, .errors = {bias_cause}},
-      {.lens = true, .lever = true},
       {.lens = true, .mount = true, .delay = true},
       {.lens = true, .mount = true, .delay = true, .shutter = true},
+      {.lever = true},
+      {.lens = true, .lever = true},
       {.mount = true, .delay = true, .errors = {scale_cause, backlash_cause, rate_scale_cause, bias_cause}},
       {.lens = true, .mount = true, .delay = true, .errors = {backlash_cause, bias_cause}},
       {.lens = true,
@@ -78,7 +80,7 @@ int size_of_layout(const RotationLog& log, const ObserveSetup& config) {
   return CommonLayout(nuisances).size;
 }
 
-/// The log's frames with the points that are seen most.
+/// The log's frames with the points that are seen most, behind the one whose range is measured.
 struct Sample {
   std::vector<RotationFrame> frames;
   std::vector<std::vector<Eigen::Vector2d>> px;
@@ -91,6 +93,7 @@ Sample sample_of(const RotationLog& log, const ObserveSetup& config, const Pixel
   for (const RotationRow& row : log.rows) {
     for (std::size_t i = 0; i < row.px.size(); ++i) seen[i].first -= is_seen(row.px[i]) ? 1 : 0;
   }
+  if (log.range_point < seen.size()) seen[log.range_point].first = std::numeric_limits<int>::min();
   std::sort(seen.begin(), seen.end());
   seen.resize(std::min(seen.size(), max_points));
   Sample sample;
@@ -126,19 +129,17 @@ FrameBuffer buffer_of(const std::vector<RotationFrame>& frames, const Sample& sa
 
 AdjustConfig trial_config(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
                           int num_errors) {
-  AdjustConfig adjust_with;
-  adjust_with.gives_up = true;
-  adjust_with.nuisances = config.nuisances;
-  adjust_with.nuisances.errors = num_errors;
-  adjust_with.with_depth = needs_depth(log, config);
-  adjust_with.sigma_range_m = config.sigma_range_m;
   ObserveSetup sized = config;
   sized.width_px = report.width_px;
   sized.height_px = report.height_px;
-  adjust_with.start = start_camera(sized, report.scale);
-  adjust_with.start.errors = RotationErrors::Zero(num_errors);
-  if (!log.rows.empty()) adjust_with.start.drift_from_s = log.rows.back().t_s;
-  adjust_with.prior = said_prior(config, adjust_with.start);
+  RotatingCamera start = start_camera(sized, report.scale);
+  start.errors = RotationErrors::Zero(num_errors);
+  if (!log.rows.empty()) start.drift_from_s = log.rows.back().t_s;
+  AdjustConfig adjust_with = adjust_config_of(log, config, start, report.scale);
+  adjust_with.gives_up = true;
+  adjust_with.nuisances.errors = num_errors;
+  adjust_with.sigma_px = 0.0;
+  adjust_with.range_point = 0;  // of a sample
   if (!config.start) adjust_with.other_starts = {2.5};
   return adjust_with;
 }

@@ -273,11 +273,10 @@ bool never_rests(const RotationLog& log, const ObserveSetup& config, const Obser
 void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
                      ObserveSolution& report) {
   constexpr double max_off = 3.0;
+  using Status = ObserveSolution::Status;
   const bool is_filter = config.method == ObserveMethod::hybrid || config.method == ObserveMethod::window;
   if (!is_filter || config.rotation != RotationKnowledge::known) return;
-  if (report.status == ObserveSolution::Status::focal_length_varies ||
-      report.status == ObserveSolution::Status::too_few_data)
-    return;
+  if (report.status == Status::focal_length_varies || report.status == Status::too_few_data) return;
   if (is_answer(report) && !(report.from_reference > max_off)) return;
   ObserveSetup whole = config;
   whole.method = ObserveMethod::batch;
@@ -370,7 +369,8 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   // No cause explains a rotation that is read otherwise than it was meant: seconds are not spent on looking for one.
   Misread misread;
   if (is_judged && is_gross(report)) misread = misread_rotation(log, config, report, progress);
-  if (config.estimate_auto && is_judged && !misread.explains_all && !report.mounting_step) {
+  const bool is_noisy = config.rotation == RotationKnowledge::noisy && report.status != Status::too_few_data;
+  if (config.estimate_auto && (is_noisy || (is_judged && !misread.explains_all && !report.mounting_step))) {
     find_causes(log, given, progress, config, report, rivals);
   } else if (config.estimate_auto && !is_known) {
     free_one_by_one(log, progress, config, report, rivals);

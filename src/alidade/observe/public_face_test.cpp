@@ -160,6 +160,7 @@ TEST(ObserveFace, AnswersWordsThatDoNotFit) {
     return config;
   };
   EXPECT_THAT(fault_of(with_words({"k9"})), ::testing::HasSubstr("--estimate: 'k9' is not auto, none, k1,"));
+  EXPECT_THAT(fault_of(with_words({"none", "k1"})), ::testing::HasSubstr("none goes with no other word"));
   EXPECT_THAT(fault_of(with_words({"backlash"})), ::testing::HasSubstr("has no such error"));
   ObserveConfig config = with_words({"scale"});
   config.sigma_scale = 0.0;

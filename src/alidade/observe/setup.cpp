@@ -94,6 +94,9 @@ ObserveSetup setup_of(const ObserveConfig& config) {
   Faults faults;
   check_numbers(setup, faults);
   for (const std::string& word : config.estimate) take_word(word, setup, faults);
+  if (config.estimate.size() > 1 && std::ranges::count(config.estimate, "none") > 0) {
+    faults.emplace_back("--estimate: none goes with no other word");
+  }
   const std::string of_camera = config.camera ? camera_fault(*config.camera) : "";
   if (!of_camera.empty()) faults.push_back(of_camera);
   if (config.camera && of_camera.empty()) take_camera(*config.camera, setup);

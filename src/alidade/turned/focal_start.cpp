@@ -98,6 +98,16 @@ std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vec
   return minima;
 }
 
+FocalStart start_at(double focal, const MatchedPhotos& photos, const std::vector<PhotoLink>& links, double aspect) {
+  FocalStart start{focal, aspect, 0.0, {}};
+  for (const PhotoLink& link : links) {
+    const Turn turn = robust_turn(points_of(photos, link, aspect), focal);
+    start.cost += turn.cost;
+    start.b_from_a.push_back(turn.b_from_a);
+  }
+  return start;
+}
+
 double likely_aspect(const MatchedPhotos& photos, const std::vector<PhotoLink>& links) {
   constexpr std::size_t max_links = 20;
   constexpr double most = 2.0, step = 1.06, focal_step = 1.15;

@@ -18,6 +18,10 @@ struct FocalStart {
 [[nodiscard]] std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
                                                    double aspect = 1.0, std::size_t most = 3);
 
+/// The links' rotations at one focal length.
+[[nodiscard]] FocalStart start_at(double focal, const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
+                                  double aspect);
+
 /// fy / fx by which the links agree better than by square pixels, as those of a squeezed image do, or seem to where the
 /// lens distorts; 1: none.
 [[nodiscard]] double likely_aspect(const MatchedPhotos& photos, const std::vector<PhotoLink>& links);

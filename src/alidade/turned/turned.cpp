@@ -77,6 +77,11 @@ class TurnedRun {
   void fit() {
     std::vector<FocalStart> starts = focal_starts(photos_, links_);
     std::vector<TurnedFit> fits = fits_from(starts, photos_, links_, tree_, free_, progress_);
+    std::vector<TurnedFit> more = fits_of_ordinary(fits, photos_, links_, tree_, free_, progress_);
+    if (!more.empty()) {
+      fits = std::move(more);
+      starts.assign(1, start_at(fits[best_of(fits)].bundle.camera[0], photos_, links_, free_.aspect));
+    }
     num_agreeing_ = agreeing_matches(links_).size();
     std::size_t best = best_of(fits);
     if (try_other_aspect(fits, best)) starts = focal_starts(photos_, links_, free_.aspect);
@@ -85,7 +90,9 @@ class TurnedRun {
       report_.status = TurnedReport::Status::no_convergence;
       return;
     }
-    name_other_minimum(fits, best);
+    const OtherMinimum other = other_minimum(fits, best);
+    report_.other_focal_px = other.focal * scale_.half_width_px;
+    report_.other_sigmas = other.sigmas;
     fit_ = std::move(fits[best]);
   }
 
@@ -108,22 +115,6 @@ class TurnedRun {
     fits = std::move(others);
     best = 0;
     return true;
-  }
-
-  /// Another focal length that explains nearly as much nearly as well.
-  void name_other_minimum(const std::vector<TurnedFit>& fits, std::size_t best) {
-    const TurnedFit& chosen = fits[best];
-    constexpr double differs = 0.03;
-    for (std::size_t i = 0; i < fits.size(); ++i) {
-      const double ratio = fits[i].bundle.camera[0] / chosen.bundle.camera[0];
-      if (i == best || std::abs(ratio - 1.0) < differs) continue;
-      if (static_cast<double>(fits[i].num_kept) < 0.9 * static_cast<double>(chosen.num_kept)) continue;
-      const double worse = std::pow(fits[i].solve.sigma_px / chosen.solve.sigma_px, 2) - 1.0;
-      const double sigmas = std::sqrt(std::max(worse, 0.0) * freedom_of(chosen.bundle));
-      if (report_.other_focal_px > 0.0 && sigmas > report_.other_sigmas) continue;
-      report_.other_focal_px = fits[i].bundle.camera[0] * scale_.half_width_px;
-      report_.other_sigmas = sigmas;
-    }
   }
 
   /// Were some photos zoomed? From the homographies alone, which hold for a camera that zooms as well.
@@ -266,8 +257,7 @@ class TurnedRun {
   /// With fewer terms. σ includes theirs, and the change of the answer when they are estimated: either may be the right
   /// lens.
   void drop(int lens_terms, bool decentred, ScatterCovariance& scatter) {
-    std::vector<int> dropped;
-    for (int i = lens_terms; i < free_.lens_terms; ++i) dropped.push_back(radial_places[static_cast<std::size_t>(i)]);
+    std::vector<int> dropped(radial_places.begin() + lens_terms, radial_places.begin() + free_.lens_terms);
     if (free_.decentred && !decentred) dropped.insert(dropped.end(), {decentring_place, decentring_place + 1});
     const Eigen::MatrixXd with_dropped = scatter.cov(Eigen::all, dropped);
     by_lens_ += with_dropped * inverse_symmetric(scatter.cov(dropped, dropped)) * with_dropped.transpose();

@@ -62,6 +62,7 @@ class TurnedSystem {
     normal.information.diagonal() *= 1.0 + damping;
     for (TrackBlock& block : blocks_) eliminate(block, damping, normal);
     normal.information.triangularView<Eigen::StrictlyUpper>() = normal.information.transpose();
+    if (!(prior_.zoom_information < fixed)) hold_zooms(normal);
     return normal;
   }
 
@@ -86,6 +87,18 @@ class TurnedSystem {
   }
 
  private:
+  /// Zooms that are not estimated stay exactly: sure pixels in great number know them nearly as well as `fixed` does,
+  /// and would move them step by step.
+  void hold_zooms(TurnedNormal& normal) const {
+    for (std::size_t k = 0; k < bundle_.cam_from_world.size(); ++k) {
+      const auto at = place_of(static_cast<int>(k)) + 3;
+      normal.information.row(at).setZero();
+      normal.information.col(at).setZero();
+      normal.information(at, at) = fixed;
+      normal.gradient[at] = 0.0;
+    }
+  }
+
   void add_track(std::size_t first, std::size_t last) {
     TrackBlock block{first, last, {}, {}, {}, {}, {}};
     const Eigen::Vector3d& ray = bundle_.rays[static_cast<std::size_t>(bundle_.observations[first].track)];

@@ -190,6 +190,21 @@ std::vector<TurnedFit> fits_from(const std::vector<FocalStart>& starts, const Ma
   return fits;
 }
 
+std::vector<TurnedFit> fits_of_ordinary(const std::vector<TurnedFit>& fits, const MatchedPhotos& photos,
+                                        const std::vector<PhotoLink>& links, const PhotoTree& tree,
+                                        const TurnedConfig& config, const Progress& progress) {
+  constexpr double doubtful = 0.0025;  // half widths: 1.6 px of 1280, several times what a finder of points leaves
+  const auto explains = [](const TurnedFit& fit) { return fit.solve.sigma_px < doubtful; };
+  if (std::ranges::any_of(fits, explains)) return {};
+  std::vector<FocalStart> starts;
+  for (const double focal : {0.9, 1.3, 1.9, 2.8})  // half widths: 96° to 39° across
+    starts.push_back(start_at(focal, photos, links, config.aspect));
+  std::ranges::sort(starts, {}, &FocalStart::cost);
+  std::vector<TurnedFit> found = fits_from(starts, photos, links, tree, config, progress);
+  std::erase_if(found, [&](const TurnedFit& fit) { return !explains(fit); });
+  return found;
+}
+
 std::size_t best_of(std::vector<TurnedFit>& fits) {
   std::stable_sort(fits.begin(), fits.end(),
                    [](const TurnedFit& a, const TurnedFit& b) { return a.num_kept > b.num_kept; });
@@ -199,6 +214,21 @@ std::size_t best_of(std::vector<TurnedFit>& fits) {
     if (as_many && fits[i].solve.sigma_px < 0.9 * fits[best].solve.sigma_px) best = i;
   }
   return best;
+}
+
+OtherMinimum other_minimum(const std::vector<TurnedFit>& fits, std::size_t best) {
+  OtherMinimum other;
+  const TurnedFit& chosen = fits[best];
+  constexpr double differs = 0.03;
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    const double focal = fits[i].bundle.camera[0];
+    if (i == best || std::abs(focal / chosen.bundle.camera[0] - 1.0) < differs) continue;
+    if (static_cast<double>(fits[i].num_kept) < 0.9 * static_cast<double>(chosen.num_kept)) continue;
+    const double worse = std::pow(fits[i].solve.sigma_px / chosen.solve.sigma_px, 2) - 1.0;
+    const double sigmas = std::sqrt(std::max(worse, 0.0) * freedom_of(chosen.bundle));
+    if (other.focal == 0.0 || sigmas <= other.sigmas) other = {focal, sigmas};
+  }
+  return other;
 }
 
 bool is_far_better(const TurnedFit& fit, const TurnedFit& other) {

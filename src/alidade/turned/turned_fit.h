@@ -31,8 +31,20 @@ struct TurnedFit {
                                                const std::vector<PhotoLink>& links, const PhotoTree& tree,
                                                const TurnedConfig& config, const Progress& progress);
 
+/// Where none of the fits explains the photos well: from ordinary focal lengths, those that do. Through a lens that
+/// distorts strongly the links are most like rotations at no focal length, or at a wrong one.
+[[nodiscard]] std::vector<TurnedFit> fits_of_ordinary(const std::vector<TurnedFit>& fits, const MatchedPhotos& photos,
+                                                      const std::vector<PhotoLink>& links, const PhotoTree& tree,
+                                                      const TurnedConfig& config, const Progress& progress);
+
 /// Sorts the fits by the matches they keep, and says which explains most: nearly as many, with smaller residuals.
 [[nodiscard]] std::size_t best_of(std::vector<TurnedFit>& fits);
+
+/// Another focal length that explains nearly as many matches as the best fit, and how much worse, √Δχ²; 0: none.
+struct OtherMinimum {
+  double focal = 0.0, sigmas = 0.0;
+};
+[[nodiscard]] OtherMinimum other_minimum(const std::vector<TurnedFit>& fits, std::size_t best);
 
 /// Far better than `other`: pixels that are not square are too rare to be believed for less.
 [[nodiscard]] bool is_far_better(const TurnedFit& fit, const TurnedFit& other);

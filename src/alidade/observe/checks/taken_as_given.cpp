@@ -219,6 +219,21 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
   return assumed;
 }
 
+void count_left(const CauseScore* left, const std::vector<RotationError>& errors, ObserveSolution& report) {
+  const Eigen::Index n = left == nullptr ? 0 : left->shift.size();
+  if (n < 4 || n > report.covariance.rows() || n > std::ssize(report.quantities)) return;
+  Eigen::VectorXd shift = left->shift;
+  shift.head<4>() *= report.scale.scale;
+  for (Eigen::Index i = 4; i < n; ++i)
+    for (const RotationError& error : errors)
+      if (report.quantities[static_cast<std::size_t>(i)].name == error.quantity) shift[i] *= error.ordinary;
+  report.covariance.topLeftCorner(n, n) += shift * shift.transpose();
+  for (Eigen::Index i = 0; i < n; ++i)
+    report.quantities[static_cast<std::size_t>(i)].sigma = std::sqrt(report.covariance(i, i));
+  for (IntrinsicsEstimate& row : report.steps)
+    row.sigma = (row.sigma.cwiseAbs2() + shift.head<4>().cwiseAbs2()).cwiseSqrt().eval();
+}
+
 void add_assumed(const std::vector<Assumption>& assumed, const std::vector<CauseScore>& causes, CommonMatrix& cov) {
   const auto sigma_of = [&](const CauseScore& cause, const CauseMember& member) {
     const auto found = std::ranges::find(assumed, full_name(cause.name, member), &Assumption::name);

@@ -391,6 +391,7 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
     report.misread = misread.is_sought ? misread.words : misread_rotation(log, config, report, progress).words;
   }
   if (!is_answer(report)) return report;
+  if (is_noisy) count_left(best_cause(report), estimated_errors(log, config), report);
   compare_constant_spans(log, config, progress, report);
   note_assumed(report);
   return report;

@@ -102,6 +102,10 @@ struct Misread {
 [[nodiscard]] std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetup& config,
                                                      const ObserveSolution& report, CommonMatrix& cov);
 
+/// What the residuals ask for though it could not be freed, null: nothing, is in the answer, which may be off by as
+/// much: adds that to its covariance.
+void count_left(const CauseScore* left, const std::vector<RotationError>& errors, ObserveSolution& report);
+
 /// Adds to `cov` (normalised) what the errors do that are assumed with a σ above zero, by these scores of their causes.
 void add_assumed(const std::vector<Assumption>& assumed, const std::vector<CauseScore>& causes, CommonMatrix& cov);
 

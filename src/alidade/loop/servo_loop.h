@@ -23,6 +23,8 @@ ALIDADE_PUBLIC_BEGIN
 struct PlantMismatch {
   double gain = 1.0, tau = 1.0, later_s = 0.0;
 };
+
+/// The axis as it truly is: gain and time constant by those factors, its delay of commands [s] later, at least 0.
 [[nodiscard]] ServoAxis as_it_is(const ServoAxis& known, const PlantMismatch& mismatch);
 
 /// σ of a plant that was identified: of its gain in its unit, of its time constant, of its delay of commands. 0: exact.

@@ -74,7 +74,8 @@ struct GivenNumber {
   double asked = 0.0, z = 0.0;  ///< The change that the score test indicates, in units, and over its σ.
   std::optional<double> sigma;  ///< Counted, in units. None: not known.
   /// Of the focal length, and before a target of the centre: an error of up to this the score would not show, and σ of
-  /// the path has so much of it that it moves no pose by more than 4σ.
+  /// the path has so much of it that it moves no pose by more than 4σ; of a centre about which next to nothing is seen
+  /// also no combination of a pose's numbers.
   double hidden = 0.0, sigma_hidden = 0.0;
 };
 

@@ -129,6 +129,28 @@ void hide(double any, GivenNumber& given) {
   given.sigma_hidden = std::sqrt(std::max(counted * counted - by_path * by_path, 0.0));
 }
 
+/// How far any pose moves with what is given, by its covariance.
+double moves_together(const PoseChain::Spread& spread, const Eigen::VectorXd& direction,
+                      std::span<const Eigen::Matrix<double, 6, 6>> covs) {
+  double most = 0.0;
+  for (std::size_t k = 0; k < covs.size(); ++k)
+    most = std::max(most, squared_mahalanobis(spread.J[k] * direction, covs[k]));
+  return std::sqrt(most);
+}
+
+/// Another centre moves position and rotation together, and what these share is known far better than either: 4σ of
+/// each are many of that. Where an ordinary error would not show as 2σ of its score, so much counts that it moves no
+/// combination by more than 4σ; what a score beyond 2σ asks for counts as far as it is ordinary.
+void count_together(double any, double moves, GivenNumber& given) {
+  constexpr double in_doubt_z = 2.0, most_sigmas = 4.0;
+  const double ordinary = 0.5 * any, z = std::abs(given.z), sigma = z > 0.0 ? std::abs(given.asked) / z : any;
+  double counted = 0.0;
+  if (in_doubt_z * sigma > ordinary)
+    counted = std::sqrt(std::max(std::pow(given.hidden / most_sigmas, 2) - std::pow(moves, -2), 0.0));
+  if (z > in_doubt_z) counted = std::max(counted, std::abs(given.asked) / (1.0 + std::pow(sigma / ordinary, 2)));
+  given.sigma_hidden = std::max(given.sigma_hidden, std::min(counted, any));
+}
+
 }  // namespace
 
 /// `path.given` and its ids are there.
@@ -140,13 +162,16 @@ void PathSmoother::fill_hidden(const PoseChain::Spread& spread, SmoothedPath& pa
     const bool is_focal = !param.names[1].empty();
     if (!is_focal && problem_.gauge != PathGauge::fixed) continue;  // nothing says how such a world is rotated
     hide(param.most * (is_focal ? 1.0 : problem_.camera.width_px), *given);
-    if (!(given->sigma_hidden > 0.0)) continue;
-    Eigen::VectorXd move = Eigen::VectorXd::Zero(spread.J.front().cols());
+    Eigen::VectorXd direction = Eigen::VectorXd::Zero(spread.J.front().cols());
     for (int i = num_estimated_; i < static_cast<int>(lens_order_.size()); ++i) {
       const auto at = static_cast<std::size_t>(lens_order_[static_cast<std::size_t>(i)]);
       if (std::ranges::find(param.names, names[at]) != param.names.end())
-        move[i - num_estimated_] = given->sigma_hidden * (is_focal ? given_lens_[static_cast<Eigen::Index>(at)] : 1.0);
+        direction[i - num_estimated_] = is_focal ? given_lens_[static_cast<Eigen::Index>(at)] : 1.0;
     }
+    if (!is_focal)
+      count_together(param.most * problem_.camera.width_px, moves_together(spread, direction, path.cov), *given);
+    if (!(given->sigma_hidden > 0.0)) continue;
+    const Eigen::VectorXd move = given->sigma_hidden * direction;
     SmoothedPath::Hidden& hidden = path.hidden.emplace_back();
     for (const auto& J : spread.J) hidden.poses.emplace_back(J * move);
     for (const long id : path.ids) hidden.points.emplace_back(spread.point_J[index_of_.at(id)] * move);

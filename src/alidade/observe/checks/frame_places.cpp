@@ -2,34 +2,34 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "alidade/estimation/median.h"
-#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
+#include "alidade/observe/checks/image_turn.h"
 #include "alidade/observe/rotation_frame.h"
 #include "alidade/observe/setup.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t most_missing = 30;
+constexpr int most_missing = 30;  // at a time
 
-/// The rotation of the image between two rows, over an assumed focal length, and how far points moved.
-struct ImageTurn {
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-  double moved_px = 0.0;  ///< Median.
+/// A measured rotation and its change; and how that of the image follows from it.
+using Turn = Eigen::Matrix<double, 6, 1>;
+using ImageByTurn = Eigen::Matrix<double, 3, 6>;
+
+/// From an image to the next that is another; none: too few points in common.
+struct Step {
+  std::size_t from = 0, to = 0;
+  std::optional<ImageTurn> image;
 };
-
-/// Σ w J y by weighted least squares, where all of it is determined.
-template <int Num>
-Eigen::Matrix<double, Num, 1> solved(const Eigen::Matrix<double, Num, Num>& A, const Eigen::Matrix<double, Num, 1>& b) {
-  constexpr double hardly = 1e-9;
-  const double size = A.trace() / Num;
-  Eigen::Matrix<double, Num, Num> damped = A;
-  damped.diagonal().array() += hardly * size + 1e-300;
-  return solve_symmetric(damped, b);
-}
 
 class Places {
  public:
@@ -37,6 +37,7 @@ class Places {
     constexpr double max_gap_s = 0.25;
     MotionReader reader(log.source, max_gap_s);
     std::size_t segment = 0;
+    Eigen::Vector2d low = Eigen::Vector2d::Constant(1e12), high = -low;
     for (const RotationRow& row : log.rows) {
       const RotationFrame frame = reader.next(row);
       segment += frame.starts_segment ? 1 : 0;
@@ -45,22 +46,35 @@ class Places {
       is_measured_.push_back(!frame.px.empty());
       for (const Eigen::Vector2d& px : row.px)
         if (is_seen(px)) {
-          low_ = low_.cwiseMin(px);
-          high_ = high_.cwiseMax(px);
+          low = low.cwiseMin(px);
+          high = high.cwiseMax(px);
         }
     }
-    focal_px_ = std::max((high_ - low_).maxCoeff(), 1.0);
+    focal_px_ = std::max((high - low).maxCoeff(), 1.0);
+    centre_ = 0.5 * (low + high);
   }
 
   [[nodiscard]] FramePlaces found() {
     if (log_.rows.size() < 20 || !has_rate()) return {};
-    FramePlaces places;
-    for (int pass = 0; pass < 2; ++pass) {
-      if (!fit(places)) return {};
-      places = walk();
-      if (places.are_as_given()) break;
-    }
-    return places;
+    note_steps();
+    const auto as_given = fitted(std::vector<int>(steps_.size() + 1, 0));
+    if (!as_given) return {};
+    std::vector<Path> paths{*as_given};
+    constexpr std::size_t few = 30;
+    for (const std::size_t first : {few, steps_.size()})
+      if (const auto path = placed_from(first)) paths.push_back(*path);
+    if (const auto path = placed_one_by_one()) paths.push_back(*path);
+    usual_ = std::ranges::min_element(paths, {}, &Path::usual)->usual;
+    const auto cost = [&](const Path& path) {
+      image_by_turn_ = path.image_by_turn;
+      return cost_of(path.later);
+    };
+    constexpr double clearly = 10.0;
+    const double cost_as_given = cost(*as_given);
+    auto best = std::ranges::min_element(paths, {}, cost);
+    if (cost(*best) + clearly > cost_as_given) best = paths.begin();
+    image_by_turn_ = best->image_by_turn;
+    return places_of(best->later);
   }
 
  private:
@@ -75,163 +89,265 @@ class Places {
   }
 
   /// As measured, in the camera's axes; none across what was not.
-  [[nodiscard]] std::optional<Eigen::Vector3d> measured(std::size_t from, std::size_t to) const {
-    if (to >= cam_from_start_.size() || segment_[from] != segment_[to] || !is_measured_[from] || !is_measured_[to])
+  [[nodiscard]] std::optional<Eigen::Vector3d> rotated(std::size_t from, std::size_t to) const {
+    if (std::max(from, to) >= cam_from_start_.size() || segment_[from] != segment_[to] || !is_measured_[from] ||
+        !is_measured_[to])
       return std::nullopt;
     return log_so3(cam_from_start_[to] * cam_from_start_[from].conjugate());
   }
 
-  /// The flow of points by a small rotation, as all but a few of them have it.
-  [[nodiscard]] std::optional<ImageTurn> seen(std::size_t from, std::size_t to) const {
-    constexpr std::size_t enough = 4;
-    const Eigen::Vector2d centre = 0.5 * (low_ + high_);
-    std::vector<Eigen::Matrix<double, 2, 3>> J;
-    std::vector<Eigen::Vector2d> flow;
-    std::vector<double> moved_px;
-    for (std::size_t i = 0; i < log_.num_points; ++i) {
-      const Eigen::Vector2d &a = log_.rows[from].px[i], &b = log_.rows[to].px[i];
-      if (!is_seen(a) || !is_seen(b)) continue;
-      const Eigen::Vector2d p = (0.5 * (a + b) - centre) / focal_px_;
-      J.emplace_back();
-      J.back() << p.x() * p.y(), -(1.0 + p.x() * p.x()), p.y(), 1.0 + p.y() * p.y(), -p.x() * p.y(), -p.x();
-      flow.push_back((b - a) / focal_px_);
-      moved_px.push_back((b - a).norm());
-    }
-    if (flow.size() < enough) return std::nullopt;
-    ImageTurn all{Eigen::Vector3d::Zero(), median_of(std::move(moved_px))};
-    std::vector<double> weights(flow.size(), 1.0), off(flow.size());
-    for (int i = 0; i < 4; ++i) {
-      Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-      Eigen::Vector3d b = Eigen::Vector3d::Zero();
-      for (std::size_t k = 0; k < flow.size(); ++k) {
-        A += weights[k] * J[k].transpose() * J[k];
-        b += weights[k] * J[k].transpose() * flow[k];
-      }
-      all.turn = solved<3>(A, b);
-      for (std::size_t k = 0; k < flow.size(); ++k) off[k] = (flow[k] - J[k] * all.turn).norm();
-      weigh(off, weights);
-    }
-    return all;
+  /// With how it changes from row to row, which a delay of less than a row adds.
+  [[nodiscard]] std::optional<Turn> measured(std::size_t from, std::size_t to) const {
+    const auto now = rotated(from, to);
+    if (!now) return std::nullopt;
+    Turn turn = Turn::Zero();
+    turn.head<3>() = *now;
+    const auto before = rotated(from - 1, to - 1), after = rotated(from + 1, to + 1);
+    if (before && after) turn.tail<3>() = 0.5 * (*after - *before);
+    return turn;
   }
 
-  /// Beyond twice the median an error counts by its size alone (P. J. Huber 1964).
-  static void weigh(const std::vector<double>& off, std::vector<double>& weights) {
-    const double usual = 2.0 * median_of(off) + 1e-12;
-    for (std::size_t k = 0; k < off.size(); ++k) weights[k] = usual / std::max(usual, off[k]);
+  /// The images that differ from the one before, and how; the same image again is no step.
+  void note_steps() {
+    constexpr double still_px = 0.02;  // no finder puts points at the same hundredth in two images
+    std::size_t last = 0;
+    for (std::size_t k = 1; k < log_.rows.size(); ++k) {
+      const auto image = image_turn(log_.rows[last], log_.rows[k], centre_, focal_px_);
+      if (image && image->moved_px < still_px) continue;
+      steps_.push_back({last, k, image});
+      last = k;
+    }
+  }
+
+  /// How much later than in its own row each image was taken, and what the image shows of a rotation then.
+  struct Path {
+    std::vector<int> later;
+    ImageByTurn image_by_turn;
+    double usual;
+  };
+
+  [[nodiscard]] std::optional<Path> fitted(std::vector<int> later) {
+    if (!fit(later, steps_.size(), true)) return std::nullopt;
+    return Path{std::move(later), image_by_turn_, usual_};
+  }
+
+  /// From the first so many images on, ever more: a fit to many misplaced ones is of none. Where it is theirs in part
+  /// its errors are large: gaps are sought as if they were half of it. A delay is known when the images are in their
+  /// rows.
+  [[nodiscard]] std::optional<Path> placed_from(std::size_t first) {
+    constexpr double longer = 1.2, ready = 0.5;
+    constexpr int passes = 4;
+    std::vector<int> later(steps_.size() + 1, 0);
+    for (std::size_t num = first;; num = static_cast<std::size_t>(longer * static_cast<double>(num))) {
+      num = std::min(num, steps_.size());
+      for (int pass = 0; pass < passes; ++pass) {
+        if (!fit(later, num, false)) return std::nullopt;
+        usual_ *= ready;
+        if (!changes(later, num)) break;
+      }
+      if (num == steps_.size()) break;
+    }
+    for (int pass = 0; pass < passes; ++pass) {
+      if (!fit(later, steps_.size(), true)) return std::nullopt;
+      if (!changes(later, steps_.size())) break;
+    }
+    return fitted(std::move(later));
+  }
+
+  /// Each gap by itself, where a step is further by much more than others differ.
+  [[nodiscard]] std::optional<Path> placed_one_by_one() {
+    std::vector<int> later(steps_.size() + 1, 0);
+    for (int pass = 0; pass < 2; ++pass) {
+      if (!fit(later, steps_.size(), false)) return std::nullopt;
+      for (std::size_t j = 0; j < steps_.size(); ++j) later[j + 1] = later[j] + missing_before(steps_[j], later[j]);
+    }
+    return fitted(std::move(later));
+  }
+
+  /// As many rows as explain most of it.
+  [[nodiscard]] int missing_before(const Step& step, int later) const {
+    constexpr double much = 6.0, most = 0.5, seen_px = 0.3, explained = 0.25;
+    const auto turn = measured(row(step.from, later), row(step.to, later));
+    if (!step.image || !turn) return 0;
+    const double off = off_by(*step.image, *turn);
+    if (off < much * usual_ || off < most * (image_by_turn_ * *turn).norm() || focal_px_ * off < seen_px) return 0;
+    int best = 0;
+    double least = explained * off;
+    for (int num = 1; num <= most_missing; ++num) {
+      const auto longer = measured(row(step.from, later), row(step.to, later + num));
+      if (!longer) break;
+      if (const double left = off_by(*step.image, *longer); left < least) {
+        least = left;
+        best = num;
+      }
+    }
+    return best;
+  }
+
+  /// To the likeliest path of so many steps, where it is another.
+  [[nodiscard]] bool changes(std::vector<int>& later, std::size_t num) const {
+    std::vector<int> again = likeliest_path(num);
+    if (again == later) return false;
+    later = std::move(again);
+    return true;
   }
 
   /// What the image shows of a measured rotation: the mounting, and the focal length over the assumed one.
-  [[nodiscard]] bool fit(const FramePlaces& places) {
-    const std::vector<std::optional<std::size_t>> place = places_of(places);
-    std::vector<Eigen::Vector3d> from, to;
-    for (std::size_t k = 1; k < place.size(); ++k) {
-      if (!place[k - 1] || !place[k]) continue;
-      const auto turn = measured(*place[k - 1], *place[k]);
-      const auto image = seen(k - 1, k);
-      if (!turn || !image) continue;
+  [[nodiscard]] bool fit(const std::vector<int>& later, std::size_t num, bool knows_delay) {
+    std::vector<Turn> from;
+    std::vector<Eigen::Vector3d> to;
+    for (std::size_t j = 0; j < num; ++j) {
+      const auto turn = measured(row(steps_[j].from, later[j]), row(steps_[j].to, later[j + 1]));
+      if (!turn || !steps_[j].image) continue;
       from.push_back(*turn);
-      to.push_back(image->turn);
+      if (!knows_delay) from.back().tail<3>().setZero();
+      to.push_back(steps_[j].image->turn);
     }
-    if (from.size() < 10) return false;
+    if (from.size() < 15) return false;
     std::vector<double> weights(from.size(), 1.0), off(from.size());
     for (int i = 0; i < 10; ++i) {
-      Eigen::Matrix3d A = Eigen::Matrix3d::Zero(), B = Eigen::Matrix3d::Zero();
+      Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+      Eigen::Matrix<double, 6, 3> B = Eigen::Matrix<double, 6, 3>::Zero();
       for (std::size_t k = 0; k < from.size(); ++k) {
         A += weights[k] * from[k] * from[k].transpose();
         B += weights[k] * from[k] * to[k].transpose();
       }
-      for (Eigen::Index c = 0; c < 3; ++c) image_by_turn_.row(c) = solved<3>(A, B.col(c)).transpose();
+      for (Eigen::Index c = 0; c < 3; ++c) image_by_turn_.row(c) = solved<6>(A, B.col(c)).transpose();
       for (std::size_t k = 0; k < from.size(); ++k) off[k] = (to[k] - image_by_turn_ * from[k]).norm();
-      weigh(off, weights);
+      weigh_errors(off, weights);
     }
-    usual_ = median_of(off);
+    usual_ = std::max(median_of(off), 1e-12);
     return true;
   }
 
-  /// The row of each image's time; none of those that are no images of their own, or behind the end.
-  [[nodiscard]] std::vector<std::optional<std::size_t>> places_of(const FramePlaces& places) const {
-    std::vector<std::optional<std::size_t>> place(log_.rows.size());
-    std::size_t later = 0;
-    auto gap = places.missing.begin();
-    for (std::size_t k = 0; k < place.size(); ++k) {
-      for (; gap != places.missing.end() && gap->before == k; ++gap) later += static_cast<std::size_t>(gap->num);
-      if (k + later < place.size() && !std::ranges::binary_search(places.repeated, k)) place[k] = k + later;
+  /// Steps between images in rows of other times than theirs cost this much, in squares of the usual error; those
+  /// behind the end of the log as much as three times it. A gap is none that leaves few images behind it.
+  [[nodiscard]] std::optional<double> cost_of(const Step& step, int later_from, int later_to) const {
+    constexpr double most = 100.0, outside = 4.0, fits = 3.0, explained = 0.3;
+    constexpr std::size_t fewest_behind = 3;
+    const std::size_t from = row(step.from, later_from), to = row(step.to, later_to), num = log_.rows.size();
+    if (later_to > later_from && (from >= num || to + fewest_behind >= num)) return std::nullopt;
+    if (from >= num || to >= num) return later_to < 0 ? most : outside;
+    const auto turn = step.image ? measured(from, to) : std::nullopt;
+    if (!turn) return later_from == later_to ? std::optional(0.0) : std::nullopt;
+    const double off = off_by(*step.image, *turn) / usual_;
+    if (later_to > later_from && off > fits) {
+      const auto without = measured(from, row(step.to, later_from));
+      if (!without || off * usual_ > explained * off_by(*step.image, *without)) return std::nullopt;
     }
-    return place;
+    return std::min(off * off, most);
   }
 
-  [[nodiscard]] FramePlaces walk() const {
-    FramePlaces places;
-    std::size_t last = 0, later = 0;
-    std::vector<std::size_t> same;
-    for (std::size_t k = 1; k < log_.rows.size(); ++k) {
-      const auto image = seen(last, k);
-      const auto turn = measured(last + later, k + later);
-      if (!image || !turn) {
-        last = k;
-        same.clear();
-        continue;
-      }
-      if (is_same(*image, *turn)) {
-        same.push_back(k);
-        continue;
-      }
-      if (off_by(*image, *turn) < 0.5 * off_by(*image, measured(k - 1 + later, k + later).value_or(*turn)))
-        places.repeated.insert(places.repeated.end(), same.begin(), same.end());
-      else if (!same.empty())
-        last = k - 1;
-      if (const int num = missing_before(last, k, later); num > 0) {
-        places.missing.push_back({k, num});
-        later += static_cast<std::size_t>(num);
-      }
-      last = k;
-      same.clear();
+  [[nodiscard]] double cost_of(const std::vector<int>& later) const {
+    double cost = 0.0;
+    for (std::size_t j = 0; j < steps_.size(); ++j)
+      cost += cost_of(steps_[j], later[j], later[j + 1]).value_or(0.0) + change_cost(later[j + 1] - later[j]);
+    return cost;
+  }
+
+  [[nodiscard]] static double change_cost(int later) {
+    constexpr double gap = 60.0, inserted = 4.0;
+    return later > 0 ? gap : -inserted * later;
+  }
+
+  /// A way to place the images until one of them: how many rows later than their own, at what cost, and from where.
+  struct Way {
+    double cost = 0.0;
+    int from = 0;
+  };
+  using Ways = std::map<int, Way>;
+
+  static void offer(Ways& ways, int later, double cost, int from) {
+    const auto [at, is_new] = ways.try_emplace(later, Way{cost, from});
+    if (!is_new && cost < at->second.cost) at->second = {cost, from};
+  }
+
+  /// Goes on by a step: as before; behind an image that was inserted so many rows earlier; behind a gap later.
+  [[nodiscard]] Ways next_ways(const Ways& ways, const Step& step) const {
+    constexpr double open = 20.0, fits = 4.0, beam = 150.0, moves_px = 0.3;
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& [later, way] : ways) least = std::min(least, way.cost);
+    const bool moves = step.image && step.image->moved_px > moves_px;
+    const int num_same = std::min(static_cast<int>(step.to - step.from) - 1, most_missing);
+    Ways next;
+    for (const auto& [later, way] : ways) {
+      if (way.cost > least + beam) continue;
+      const auto go = [&, later = later, cost = way.cost](int to) {
+        if (const auto own = cost_of(step, later, to)) offer(next, to, cost + change_cost(to - later) + *own, later);
+      };
+      for (int num = 0; num <= num_same; ++num) go(later - num);
+      if (!moves || way.cost > least + open || cost_of(step, later, later).value_or(0.0) < fits) continue;
+      for (int num = 1; num <= most_missing; ++num) go(later + num);
     }
+    return next;
+  }
+
+  /// How much later than in its own row each image was taken, the first and those behind each step: all of them
+  /// together, since a gap in which the camera hardly turns shows in the steps behind it only (A. J. Viterbi 1967). A
+  /// constant delay is none.
+  [[nodiscard]] std::vector<int> likeliest_path(std::size_t num) const {
+    constexpr int max_delay = 15;
+    constexpr double delay_cost = 3.0;
+    std::vector<Ways> ways(1);
+    for (int later = -max_delay; later <= max_delay; ++later) ways[0][later] = {delay_cost * std::abs(later), later};
+    for (std::size_t j = 0; j < num; ++j) ways.push_back(next_ways(ways.back(), steps_[j]));
+    const auto best = std::ranges::min_element(ways.back(), {}, [](const auto& each) { return each.second.cost; });
+    std::vector<int> path(steps_.size() + 1, best->first);
+    for (std::size_t j = ways.size() - 1; j > 0; --j) path[j - 1] = ways[j].at(path[j]).from;
+    return path;
+  }
+
+  /// In words of rows: what is missing or there twice, the delay of the first image apart.
+  [[nodiscard]] FramePlaces places_of(const std::vector<int>& later) const {
+    FramePlaces places;
+    std::vector<int> own(log_.rows.size(), 0);
+    for (std::size_t j = 0; j < steps_.size(); ++j) {
+      const Step& step = steps_[j];
+      const int gap = later[j + 1] - later[j];
+      if (gap > 0) places.missing.push_back({step.to, gap});
+      const bool is_repeated = step.to > step.from + 1 && (gap < 0 || makes_up(step, later[j], later[j + 1]));
+      for (std::size_t k = step.from + 1; k < step.to; ++k) {
+        own[k] = later[j] - later[0];
+        if (is_repeated) places.repeated.push_back(k);
+      }
+      if (gap < 0) places.num_inserted -= gap;
+      own[step.to] = later[j + 1] - later[0];
+    }
+    const std::size_t last = steps_.empty() ? 0 : steps_.back().to;
+    for (std::size_t k = last + 1; k < own.size(); ++k) own[k] = later.back() - later[0];
     constexpr double far_px = 5.0;  // a head whose backlash is taken up moves less
-    if (const auto turn = measured(last + later, log_.rows.size() - 1); turn && !same.empty() && later == 0)
+    if (const auto turn = measured(row(last, later.back()), log_.rows.size() - 1); turn && places.missing.empty())
       if (focal_px_ * (image_by_turn_ * *turn).norm() > far_px)
-        places.repeated.insert(places.repeated.end(), same.begin(), same.end());
+        for (std::size_t k = last + 1; k < own.size(); ++k) places.repeated.push_back(k);
+    if (!places.are_as_given()) places.later = std::move(own);
     return places;
   }
 
-  [[nodiscard]] double off_by(const ImageTurn& image, const Eigen::Vector3d& turn) const {
+  /// The image behind the same ones has rotated as the camera did since the first of them, not since the last.
+  [[nodiscard]] bool makes_up(const Step& step, int later_from, int later_to) const {
+    const auto since_first = measured(row(step.from, later_from), row(step.to, later_to));
+    const auto since_last = measured(row(step.to, later_to) - 1, row(step.to, later_to));
+    return step.image && since_first && since_last &&
+           off_by(*step.image, *since_first) < 0.5 * off_by(*step.image, *since_last);
+  }
+
+  [[nodiscard]] double off_by(const ImageTurn& image, const Turn& turn) const {
     return (image.turn - image_by_turn_ * turn).norm();
   }
 
-  /// The same image again while the camera rotates: no finder puts points at the same hundredth in two.
-  [[nodiscard]] bool is_same(const ImageTurn& image, const Eigen::Vector3d& turn) const {
-    constexpr double still_px = 0.02, moves_px = 0.3;
-    return image.moved_px < still_px && focal_px_ * (image_by_turn_ * turn).norm() > moves_px;
-  }
-
-  /// As many as the rotation of the image is further, where it is by much more than a step differs otherwise.
-  [[nodiscard]] int missing_before(std::size_t last, std::size_t k, std::size_t later) const {
-    constexpr double much = 6.0, most = 0.5, seen_px = 0.3, explained = 0.25;
-    const auto image = seen(last, k);
-    const auto turn = measured(last + later, k + later);
-    if (!image || !turn) return 0;
-    const double off = off_by(*image, *turn);
-    if (off < much * usual_ || off < most * (image_by_turn_ * *turn).norm() || focal_px_ * off < seen_px) return 0;
-    int best = 0;
-    double least = explained * off;
-    for (std::size_t num = 1; num <= most_missing; ++num) {
-      const auto longer = measured(last + later, k + later + num);
-      if (!longer) break;
-      if (const double left = off_by(*image, *longer); left < least) {
-        least = left;
-        best = static_cast<int>(num);
-      }
-    }
-    return best;
+  /// Beyond the log: a row that it has not.
+  [[nodiscard]] static std::size_t row(std::size_t image, int later) {
+    return image + static_cast<std::size_t>(static_cast<std::ptrdiff_t>(later));
   }
 
   const RotationLog& log_;
   std::vector<Eigen::Quaterniond> cam_from_start_;
   std::vector<std::size_t> segment_;
   std::vector<bool> is_measured_;
-  Eigen::Vector2d low_ = Eigen::Vector2d::Constant(1e12), high_ = Eigen::Vector2d::Constant(-1e12);
+  Eigen::Vector2d centre_ = Eigen::Vector2d::Zero();
   double focal_px_ = 1.0;
-  Eigen::Matrix3d image_by_turn_ = Eigen::Matrix3d::Identity();
+  ImageByTurn image_by_turn_ = ImageByTurn::Zero();
+  std::vector<Step> steps_;
   double usual_ = 0.0;  ///< By which a step's rotation differs.
 };
 
@@ -242,12 +358,11 @@ FramePlaces frame_places(const RotationLog& log) { return Places(log).found(); }
 RotationLog placed(const RotationLog& log, const FramePlaces& places) {
   RotationLog moved = log;
   for (RotationRow& row : moved.rows) std::ranges::fill(row.px, Eigen::Vector2d::Constant(not_seen));
-  std::size_t later = 0;
-  auto gap = places.missing.begin();
   for (std::size_t k = 0; k < log.rows.size(); ++k) {
-    for (; gap != places.missing.end() && gap->before == k; ++gap) later += static_cast<std::size_t>(gap->num);
-    if (k + later >= log.rows.size()) break;
-    if (!std::ranges::binary_search(places.repeated, k)) moved.rows[k + later].px = log.rows[k].px;
+    const auto to = static_cast<std::ptrdiff_t>(k) + (places.later.empty() ? 0 : places.later[k]);
+    const bool has_row = to >= 0 && to < static_cast<std::ptrdiff_t>(log.rows.size());
+    if (has_row && !std::ranges::binary_search(places.repeated, k))
+      moved.rows[static_cast<std::size_t>(to)].px = log.rows[k].px;
   }
   return moved;
 }
@@ -270,8 +385,11 @@ Check places_check(const RotationLog& log, const FramePlaces& places) {
             (places.repeated.size() == 1 ? " image is" : " images are") +
             " the one before once more while the camera rotates, first at " +
             row_time_text(log.rows[places.repeated.front()].t_s) + ": rejected";
-  return {"frames", State::care, text,       static_cast<double>(num) + static_cast<double>(places.repeated.size()),
-          0.0,      "1",         "residuals"};
+  if (places.num_inserted > 0)
+    text += "; behind " + std::to_string(places.num_inserted) +
+            " of them the images are taken with the rotation of a row earlier each: number them as they were taken";
+  return {frames_check, State::care, text,       static_cast<double>(num) + static_cast<double>(places.repeated.size()),
+          0.0,          "1",         "residuals"};
 }
 
 }  // namespace alidade

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/observe.h"
@@ -19,7 +23,8 @@ constexpr int width = 640, height = 480;
 constexpr double true_f = 500.0;
 
 /// Four seconds of a head that sways, 30 images a second.
-RotationLog log_of(std::uint64_t seed, const RotationFaults& faults = {}, double delay_s = 0.0, double zoom = 1.0) {
+RotationLog log_of(std::uint64_t seed, const RotationFaults& faults = {}, double delay_s = 0.0, double zoom = 1.0,
+                   double rate_hz = 30.0) {
   Draws draws(9000 + seed);
   RotationScene scene;
   scene.width_px = width;
@@ -36,9 +41,9 @@ RotationLog log_of(std::uint64_t seed, const RotationFaults& faults = {}, double
   };
   RotationLogConfig config;
   config.source = RotationSource::head;
-  config.duration_s = 4.0;
-  config.rate_hz = 30.0;
-  config.sigma_px = 0.3;
+  config.duration_s = 120.0 / rate_hz;
+  config.rate_hz = rate_hz;
+  config.sigma_px = rate_hz < 30.0 ? 0.05 : 0.3;  // as followed in a film, and as in a poor one
   config.clip_to_image = true;
   RotationLog log = simulate_rotation(scene, config, seed);
   log.sigma_parallax = 0.0;
@@ -51,6 +56,11 @@ void drop(RotationLog& log, std::size_t before, std::size_t num) {
   for (std::size_t k = before; k + num < log.rows.size(); ++k) log.rows[k].px = log.rows[k + num].px;
   log.rows.resize(log.rows.size() - num);
   if (!log.truth.empty()) log.truth.resize(log.rows.size());
+}
+
+/// The image of a row once more behind it; those behind it a row later each, the last lost.
+void insert(RotationLog& log, std::size_t row) {
+  for (std::size_t k = log.rows.size() - 1; k > row; --k) log.rows[k].px = log.rows[k - 1].px;
 }
 
 ObserveReport observed(const RotationLog& log) {
@@ -92,6 +102,38 @@ TEST(FramePlaces, ImagesThatAreThereTwiceAreLeftOut) {
     EXPECT_EQ(report.verdict.state, State::care) << seed;
     EXPECT_NE(report.verdict.to_add.find("the one before once more"), std::string::npos) << report.verdict.to_add;
     EXPECT_NEAR(report.quantities[0].value, true_f, 5.0 * report.quantities[0].sigma) << seed;
+  }
+}
+
+/// As of a film that was given a constant rate: those behind are not in the rows of their time.
+TEST(FramePlaces, ImagesBehindOnesThatWereInsertedArePutInTheirRows) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    RotationLog log = log_of(seed);
+    const std::vector<std::size_t> rows{25, 50, 62, 90};
+    for (std::size_t i = rows.size(); i > 0; --i) insert(log, rows[i - 1] - i);
+    const FramePlaces places = frame_places(log);
+    EXPECT_TRUE(places.missing.empty()) << seed;
+    EXPECT_EQ(places.repeated.size(), rows.size()) << seed;
+    const ObserveReport report = observed(log);
+    EXPECT_EQ(report.verdict.state, State::care) << seed << report.verdict.sentence;
+    EXPECT_NE(report.verdict.to_add.find("behind 4 of them"), std::string::npos) << report.verdict.to_add;
+    ASSERT_FALSE(report.quantities.empty()) << seed;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double truth = std::array{true_f, true_f, 320.0, 240.0}[i];
+      EXPECT_NEAR(report.quantities[i].value, truth, 5.0 * report.quantities[i].sigma) << seed << " " << i;
+    }
+    EXPECT_LT(report.quantities[0].sigma, 0.005 * true_f) << seed;
+  }
+}
+
+/// Single ones, that move the image little where the head turns back, and in a film of few images a second.
+TEST(FramePlaces, ManyMissingImagesAreFoundTogether) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    RotationLog log = log_of(seed, {}, 0.02, 1.0, 12.0);
+    for (const std::size_t row : {90, 72, 55, 37, 22}) drop(log, row, 1);
+    int num = 0;
+    for (const FramePlaces::Gap& gap : frame_places(log).missing) num += gap.num;
+    EXPECT_EQ(num, 5) << seed;
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/observe/checks/frame_places.h"
 #include "alidade/observe/filters/fang_observer.h"
 #include "alidade/observe/solve/solve.h"
 
@@ -258,15 +259,20 @@ void adopt_worst_check(Verdict& verdict) {
   }
 }
 
-/// The advice of more specific checks first: a cause, the rotation's noise; and the check of a misread rotation.
+/// The advice of more specific checks first: images in rows of other times, a cause, the rotation's noise; and the
+/// check of a misread rotation.
 void add_advice(const ObserveSolution& report, Verdict& verdict) {
-  const auto cause = std::find_if(verdict.checks.begin(), verdict.checks.end(),
-                                  [](const Check& check) { return check.name.starts_with("needs "); });
-  const auto jitter = std::find_if(verdict.checks.begin(), verdict.checks.end(), [](const Check& check) {
-    return check.name == "rotation's noise" && check.state == State::care;
-  });
-  if (jitter != verdict.checks.end() && verdict.state == State::care) verdict.to_add = jitter->text;
-  if (cause != verdict.checks.end() && verdict.state == State::care) verdict.to_add = cause->text;
+  // A σ that is too large follows from a cause, and is none itself.
+  const bool has_other = std::ranges::any_of(
+      verdict.checks, [](const Check& check) { return check.state == State::bad && check.name != "focal length"; });
+  const bool may_advise = verdict.state == State::care || (verdict.state == State::bad && !has_other);
+  const auto advise = [&](const auto& is_it) {
+    const auto it = std::ranges::find_if(verdict.checks, is_it);
+    if (it != verdict.checks.end() && may_advise) verdict.to_add = it->text;
+  };
+  advise([](const Check& check) { return check.name == "rotation's noise" && check.state == State::care; });
+  advise([](const Check& check) { return check.name.starts_with("needs "); });
+  advise([](const Check& check) { return check.name == frames_check; });
   const Check read = rotation_check(report);
   verdict.checks.push_back(read);
   if (read.state == State::bad) {

@@ -12,6 +12,7 @@ struct ObserveSetup : ObserveConfig {
   std::vector<std::string> estimate_errors;  ///< And errors of the measured rotation: causes of rotation_errors().
   bool estimate_auto = false;                ///< And what the residuals ask for.
   bool lens_is_given = false;                ///< The pixels are freed of a lens that is given: it is not estimated.
+  bool is_no_lever = false;                  ///< One was estimated as no head has it: it is not asked for again.
   std::optional<double> sigma_k1;            ///< Of the lens that is given.
 };
 

@@ -68,7 +68,7 @@ ObserveSetup freed_by(const Trial& trial, const ObserveSetup& config) {
   estimate.mount = estimate.mount || trial.mount;
   estimate.delay = estimate.delay || trial.delay;
   estimate.shutter = estimate.shutter || trial.shutter;
-  estimate.lever = estimate.lever || trial.lever;
+  estimate.lever = estimate.lever || (trial.lever && !config.is_no_lever);
   estimate.drift = estimate.drift || trial.drift;
   freer.estimate_errors.insert(freer.estimate_errors.end(), trial.errors.begin(), trial.errors.end());
   return freer;

@@ -1,6 +1,7 @@
 #include "alidade/observe/filters/frame_variation.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace alidade {
 
@@ -79,7 +80,7 @@ RotationJitter rotation_jitter(const Adjustment& reference) {
   const double ratio = explained / (2.0 * num_frames) / noise;
   const double focal = reference.solution.camera.k.head<2>().mean();
   const double variance = std::max(ratio - 1.0, 0.0) * noise * num_frames / points / (focal * focal);
-  return {ratio, variance, squares > 0.0 ? to_next / squares : 0.0};
+  return {ratio, variance, std::sqrt(noise), squares > 0.0 ? to_next / squares : 0.0};
 }
 
 }  // namespace alidade

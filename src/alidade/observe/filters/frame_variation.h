@@ -23,6 +23,7 @@ struct FocalVariation {
 struct RotationJitter {
   double f_ratio = 0.0;        ///< Explained per frame over residual per degree of freedom: 1 by chance.
   double variance_rad2 = 0.0;  ///< Of a rotation about an axis across the view, beyond chance.
+  double within_frames = 0.0;  ///< σ of a pixel about its frame's own rotation, in units of the adjustment.
   double lasts = 0.0;          ///< Correlation from frame to frame: 0 for noise, larger for model errors.
 
   static constexpr double more_than_pixels = 3.0;  ///< Of f_ratio.

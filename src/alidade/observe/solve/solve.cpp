@@ -1,52 +1,14 @@
 #include <algorithm>
-#include <sstream>
 
 #include "alidade/observe/checks/cause_search.h"
 #include "alidade/observe/checks/constant_spans.h"
+#include "alidade/observe/solve/freed_causes.h"
+#include "alidade/observe/solve/settle_zooms.h"
 
 namespace alidade {
 namespace {
 
 constexpr int max_rounds = 6;
-
-/// Frees what the cause names, "k1,k2", "mount", "backlash". False: it cannot be estimated, or is already.
-bool free_cause(const std::string& cause, const RotationLog& log, ObserveSetup& config) {
-  const bool lens_is_given = config.lens_is_given;
-  ObserveNuisances& estimate = config.nuisances;
-  const ObserveNuisances before = estimate;
-  const std::size_t errors_before = estimated_errors(log, config).size();
-  config.estimate_errors.push_back(cause);
-  if (estimated_errors(log, config).size() > errors_before) return true;
-  config.estimate_errors.pop_back();
-  std::istringstream names(cause);
-  for (std::string name; std::getline(names, name, ',');) {
-    const bool is_of_lens = name.size() == 2 && (name[0] == 'k' || name[0] == 'p');
-    if (is_of_lens && lens_is_given) return false;
-    if (const auto nuisance = nuisance_of(estimate_word_of(name))) estimate.*nuisance = true;
-  }
-  // Higher terms without the lower ones are no lens that is made.
-  estimate.k2 = estimate.k2 || (estimate.k3 && !lens_is_given);
-  estimate.k1 = estimate.k1 || (estimate.k2 && !lens_is_given);
-  return CommonLayout(estimate).size > CommonLayout(before).size;
-}
-
-/// The cause that explains the residuals best, of those that are asked for; of several that do nearly as well the one
-/// with the fewest parameters: what it leaves is asked for next. Null: none is.
-const CauseScore* best_cause(const ObserveSolution& report) {
-  constexpr double nearly = 0.9;
-  const CauseScore* best = nullptr;
-  for (const CauseScore& cause : report.causes) {
-    if (cause.z >= asked_beyond(report) && (best == nullptr || cause.gain > best->gain)) best = &cause;
-  }
-  const CauseScore* simplest = best;
-  for (const CauseScore& cause : report.causes) {
-    if (best == nullptr || cause.z < asked_beyond(report) || cause.gain < nearly * best->gain) continue;
-    if (cause.members.size() < simplest->members.size()) simplest = &cause;
-  }
-  return simplest;
-}
-
-bool is_answer(const ObserveSolution& report) { return report.status == ObserveSolution::Status::ok; }
 
 /// Without an answer there may be one where the camera is mounted askew, late, and distorts its image.
 ObserveSolution second_chance(const RotationLog& log, ObserveSetup& config, const Progress& progress) {
@@ -56,110 +18,6 @@ ObserveSolution second_chance(const RotationLog& log, ObserveSetup& config, cons
   ObserveSolution report = solve_as_given(log, freer, progress);
   if (is_answer(report)) config = freer;
   return report;
-}
-
-bool has_zoom(const ObserveSolution& report) {
-  return std::any_of(report.events.begin(), report.events.end(), [](const ObserveNote& note) {
-    return note.event == ObserveEvent::zoom || note.event == ObserveEvent::restart;
-  });
-}
-
-/// Of the pixels that it is of, in rows that the filter took in: what no camera explains says nothing of zooms.
-double rejected_share(const ObserveSolution& solution, const RotationLog& log,
-                      const std::vector<IntrinsicsEstimate>& filtered) {
-  const RotationBundle& bundle = solution.reference.bundle;
-  std::vector<double> kept(bundle.frames.size(), 0.0);
-  for (const BundleObservation& seen : bundle.observations) kept[static_cast<std::size_t>(seen.frame)] += 1.0;
-  double all = 0.0, out = 0.0;
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    const auto row = std::ranges::lower_bound(log.rows, bundle.frames[k].t_s - 1e-9, {}, &RotationRow::t_s);
-    const IntrinsicsEstimate& estimate = filtered[static_cast<std::size_t>(row - log.rows.begin())];
-    if (!estimate.has_value || estimate.event == ObserveEvent::burst) continue;
-    const auto num = static_cast<double>(std::ranges::count_if(row->px, is_seen));
-    all += num;
-    out += num - kept[k];
-  }
-  return out / std::max(1.0, all);
-}
-
-/// Whether one of what all rows ask for most, once it is estimated, leaves no more noise than this.
-bool a_cause_explains(const RotationLog& log, const ObserveSetup& whole, ObserveSolution& all, double noise_px,
-                      const Progress& progress) {
-  constexpr double as_well = 1.05;
-  constexpr std::size_t most = 4;
-  std::vector<CauseScore> causes = all.causes;
-  std::erase_if(causes, [&](const CauseScore& cause) { return cause.z < asked_beyond(all); });
-  std::ranges::sort(causes, std::ranges::greater{}, &CauseScore::gain);
-  for (std::size_t i = 0; i < std::min(most, causes.size()); ++i) {
-    ObserveSetup freer = whole;
-    if (!free_cause(causes[i].name, log, freer)) continue;
-    const ObserveSolution freed = solve_as_given(log, freer, progress);
-    if (!is_answer(freed) || !(freed.sigma_px < as_well * noise_px)) continue;
-    all.causes = {causes[i]};  // far from the optimum the scores' order is not theirs
-    return true;
-  }
-  return false;
-}
-
-/// A step of the mounting that explains as much as the zooms of the report.
-std::optional<MountingStep> step_instead(const RotationLog& log, const ObserveSetup& config,
-                                         const ObserveSolution& report, const Progress& progress) {
-  constexpr double as_well = 1.1, less = 0.9;  // than the zooms, and than neither
-  return mounting_step(log, config, report, as_well * report.sigma_px, less, progress);
-}
-
-/// A camera that was bumped: each part of the log seems to be of another one. In a short log a constant cause does what
-/// a step does as well: then that is asked for. False: neither.
-bool takes_step(const RotationLog& log, const ObserveSetup& config, const ObserveSetup& whole, const Progress& progress,
-                ObserveSolution& all, ObserveSolution& report) {
-  const auto step = step_instead(log, config, report, progress);
-  if (!step) return false;
-  if (a_cause_explains(log, whole, all, step->noise_px, progress)) {
-    report.causes = std::move(all.causes);
-    return true;
-  }
-  report = std::move(all);
-  report.mounting_step = step;
-  report.mounting_step->is_counted = true;
-  return true;
-}
-
-/// What is not modelled, and errors that last, may look like zooms, and each rest between them be explained by itself.
-/// Where all rows fit one camera nearly as well there was no zoom: theirs is the answer. Where they do not but are
-/// steady, what they ask for counts.
-void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
-                  ObserveSolution& report) {
-  constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
-  constexpr double more = 0.05;  // of the pixels: rows of another focal length are rejected together, and raise nothing
-  const bool is_known = config.rotation == RotationKnowledge::known;
-  if (!has_zoom(report) || report.mounting_step || !is_known || !is_answer(report) ||
-      config.method != ObserveMethod::hybrid)
-    return;
-  ObserveSetup whole = config;
-  whole.method = ObserveMethod::batch;
-  ObserveSolution all = solve_as_given(log, whole, progress);
-  if (!is_answer(all)) {
-    report.mounting_step = step_instead(log, config, report, progress);
-    return;
-  }
-  const auto rejected = [&](const ObserveSolution& each) { return rejected_share(each, log, report.steps); };
-  const bool rejects_rows = rejected(all) > rejected(report) + more;
-  if ((all.sigma_px < nearly * report.sigma_px && !rejects_rows) || config.no_zoom) {
-    const IntrinsicsEstimate last = all.steps.back();
-    all.steps = std::move(report.steps);
-    all.steps.back() = last;
-    all.events = std::move(report.events);
-    all.nis_per_dof = report.nis_per_dof;
-    report = std::move(all);
-    return;
-  }
-  if (takes_step(log, config, whole, progress, all, report)) return;
-  constexpr double far_off = 3.0;  // the noise of one camera's rows beside a real zoom's: nothing is determined by them
-  if (rejects_rows || all.sigma_px > far_off * report.sigma_px) return;
-  const CauseScore* best = best_cause(all);
-  if (best == nullptr || best->name == "focal length that drifts") return;
-  const CauseScore* known = best_cause(report);
-  if (known == nullptr || best->gain > known->gain) report.causes = std::move(all.causes);
 }
 
 /// A focal length that changes faster than warmth or a creeping focus do is a zoom.
@@ -212,11 +70,15 @@ std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const Rotation
 void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report,
                      std::vector<Rival>& rivals) {
   for (int round = 0; round < max_rounds && is_answer(report); ++round) {
-    const CauseScore* cause = best_cause(report);
+    const CauseScore* cause = best_cause(report, config.is_no_lever);
     ObserveSetup next = config;
     if (cause == nullptr || zooms(*cause) || !free_cause(cause->name, log, next)) break;
     ObserveSolution freer = solve_as_given(log, next, progress);
     if (!is_answer(freer)) break;
+    if (cause->name == lever_cause && has_absurd_lever(freer)) {
+      config.is_no_lever = true;
+      continue;
+    }
     note_rivals(report, *cause, rivals);
     report = std::move(freer);
     config = next;
@@ -248,6 +110,10 @@ bool search_causes(const RotationLog& log, const Progress& progress, ObserveSetu
     freer.method = config.method;
   }
   if (!is_answer(again)) return false;
+  if (!config.nuisances.lever && has_absurd_lever(again)) {
+    config.is_no_lever = true;
+    return search_causes(log, progress, config, report);
+  }
   report = std::move(again);
   config = std::move(freer);
   return true;
@@ -308,6 +174,14 @@ void note_ungiven(const ObserveSolution& report, const std::vector<RotationError
                          0.0, 0.0, "", "residuals"});
 }
 
+/// Asked for, but as no head has it: what asks for it is something else. Its share of σ stays.
+void drop_lever(ObserveSolution& report) {
+  std::erase_if(report.causes, [](const CauseScore& cause) { return cause.name.starts_with(lever_cause); });
+  report.side_checks.push_back({"no lever", State::good,
+                                "a lever would explain the residuals, but of a metre or more: it is not estimated", 0.0,
+                                0.0, "", "residuals"});
+}
+
 void note_assumed(ObserveSolution& report) {
   std::string names;
   for (const ObservedQuantity& quantity : report.quantities)
@@ -338,6 +212,7 @@ void find_causes(const RotationLog& log, const ObserveSetup& given, const Progre
   }
   free_one_by_one(log, progress, config, report, rivals);
   ObserveSetup again = given;
+  again.is_no_lever = config.is_no_lever;
   if (has_zoom(report) || !is_answer(report) || !is_doubtful(report)) return;
   if (!search_causes(log, progress, again, report)) return;
   config = std::move(again);
@@ -393,6 +268,7 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   if (!is_answer(report)) return report;
   if (is_noisy) count_left(best_cause(report), estimated_errors(log, config), report);
   compare_constant_spans(log, config, progress, report);
+  if (config.is_no_lever) drop_lever(report);
   note_assumed(report);
   return report;
 }

@@ -90,10 +90,11 @@ struct RigCause {
 struct RigFreed {
   std::string name;  ///< "head1.pan_scale", "head1.camera.f", "head2.pan_cos_rad"
   double value = 0.0, sigma = 0.0;
-  double was = 0.0;        ///< As given.
-  double was_sigma = 0.0;  ///< With which it was given; 0: as if exact.
+  double was = 0.0;          ///< As given.
+  double was_sigma = 0.0;    ///< With which it was given; 0: as if exact.
+  double pair_sigmas = 0.0;  ///< Of both amplitudes of a period together, as σ of a normal; 0: it is no amplitude.
 
-  /// How far it is from what was given, in σ of both.
+  /// How far it is from what was given, in σ of both; an amplitude: its own or its pair's, whichever is more.
   [[nodiscard]] double sigmas() const;
 };
 

@@ -289,15 +289,17 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
       cluster_covariance(*covariance.cov, 1.0, view_cluster_steps(work.problem, solved, *covariance.cov, weights));
   take_pulls(work, weights);
   const RigGiven given = rig_given(work.problem, solved, *covariance.cov, weights, work.config);
-  const Eigen::MatrixXd cov_wide = widened(work.problem, given.wide, work.report.clusters.cov);
+  RigCauses causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed, given.cov_lenses,
+                                work.num_given, work.report.clusters.inflation.array().square().mean());
+  work.report.causes = std::move(causes.all);
+  const Eigen::MatrixXd cov_wide =
+      widened(work.problem, given.wide, work.report.clusters.cov + causes.moves * causes.moves.transpose());
   const WorldAtCamera world = world_at_camera(given.wide, state, cov_wide + given.cov);
   work.report.rig = world.rig;
   take_lenses(work.report.rig, given, state, world.J, cov_wide + given.cov);
   take_backlash(work, state, given.wide, cov_wide + given.cov);
   work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
   take_assumed(work.report, given, world.J);
-  work.report.causes =
-      rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed, given.cov_lenses, work.num_given);
   work.report.deviance =
       solved.system.cost + 4.0 * static_cast<double>(work.report.views_used) * std::log(work.report.sigma_encoder_rad);
   for (std::size_t b = 0; b < work.boards.size(); ++b) {

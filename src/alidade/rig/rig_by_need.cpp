@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "alidade/estimation/innovation.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/rig/rig_given.h"
 #include "alidade/rig/rig_work.h"
@@ -244,6 +245,17 @@ class ByNeed {
     }
   }
 
+  /// Each by itself may be small where the error of a period is plain.
+  double pair_sigmas(std::size_t h, int param) const {
+    const bool is_tilt = param >= tilt_cos_param;
+    const Encoder& encoder = best_.rig.heads[h].head.encoder;
+    const Eigen::Vector2d amplitudes = is_tilt ? Eigen::Vector2d(encoder.tilt_cos_rad, encoder.tilt_sin_rad)
+                                               : Eigen::Vector2d(encoder.pan_cos_rad, encoder.pan_sin_rad);
+    const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h) + (is_tilt ? tilt_cos_param : pan_cos_param);
+    const Eigen::Matrix2d cov = best_.rig.cov.block<2, 2>(at, at);
+    return score_sigmas(amplitudes.dot(cov.inverse() * amplitudes), 2.0, 0.0);
+  }
+
   RigFreed freed_of(std::size_t h, int param) const {
     const RigHead& rig_head = best_.rig.heads[h];
     const Encoder& encoder = rig_head.head.encoder;
@@ -256,6 +268,7 @@ class ByNeed {
                              : std::array{encoder.pan_cos_rad, encoder.pan_sin_rad, encoder.tilt_cos_rad,
                                           encoder.tilt_sin_rad}[static_cast<std::size_t>(param - pan_cos_param)];
       if (is_scale) freed.was_sigma = counted_sigma_scale(config_).value_or(0.0);
+      if (!is_scale) freed.pair_sigmas = pair_sigmas(h, param);
       freed.was = is_scale ? std::copysign(1.0, freed.value) : 0.0;  // its sign is detected, not a cause
     } else if (param >= pan_backlash_param) {
       const int axis = param - pan_backlash_param;
@@ -287,7 +300,7 @@ class ByNeed {
 
 }  // namespace
 
-double RigFreed::sigmas() const { return std::abs(value - was) / std::hypot(sigma, was_sigma); }
+double RigFreed::sigmas() const { return std::max(pair_sigmas, std::abs(value - was) / std::hypot(sigma, was_sigma)); }
 
 RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
                         std::span<const Eigen::Vector3d> points_in_board, const std::map<int, Camera>& cameras,

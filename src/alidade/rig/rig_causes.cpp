@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/rig/checks/board_print.h"
 #include "alidade/rig/checks/moved_boards.h"
 #include "alidade/rig/checks/rig_score.h"
@@ -135,28 +136,42 @@ VectorXd given_sigmas(const std::vector<Assumption>& assumed, const Tested& test
   return sigmas;
 }
 
+/// What may be there beside the noise that such a score has anyway: of 40 that are tested, one exceeds it.
+VectorXd unsettled(const IndicatedChange& asked, double inflation) {
+  constexpr double by_chance = 2.2;
+  const double share = 1.0 - by_chance * by_chance * inflation / (asked.sigmas * asked.sigmas);
+  return std::sqrt(std::max(0.0, share)) * asked.moves;
+}
+
 }  // namespace
 
-std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
-                                 const std::vector<double>& weights, const std::vector<Assumption>& assumed,
-                                 const MatrixXd& cov_lenses, double num_given) {
+RigCauses rig_causes(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
+                     const std::vector<double>& weights, const std::vector<Assumption>& assumed,
+                     const MatrixXd& cov_lenses, double num_given, double inflation) {
   const auto num = tested_a_head * static_cast<Index>(solved.state.heads.size());
   const RigScore score = rig_score(problem, solved, cov, weights, num, [&](std::size_t v) {
     const Index first = tested_a_head * static_cast<Index>(problem.views[v].head);
     return std::optional<TestedColumns>({first, tested_columns(problem, solved.state, v)});
   });
   std::vector<RigCause> causes;
+  VectorXd moves = VectorXd::Zero(cov.rows());
+  double most = 0.0;
+  const auto consider = [&](const IndicatedChange& asked) {
+    const VectorXd by = unsettled(asked, inflation);
+    if (const double squared = by.dot(solve_symmetric(cov, by)); squared > most) moves = by, most = squared;
+  };
   for (const Tested& tested : tested_of(problem, solved.state)) {
     const auto asked = score.asked(tested.places, tested.worst, given_sigmas(assumed, tested), cov_lenses, num_given);
     if (!asked) continue;
     const double size = asked->size.size() == 1 ? asked->size[0] : asked->size.norm();
     causes.push_back({tested.name, size, tested.unit, asked->sigmas});
+    consider(*asked);
   }
   if (const auto moved = moved_boards(problem, solved, cov, weights, cov_lenses, num_given)) causes.push_back(*moved);
   for (RigCause& cause : board_print(problem, solved, cov, weights, cov_lenses, num_given))
     causes.push_back(std::move(cause));
   std::ranges::sort(causes, std::greater{}, &RigCause::rank);
-  return causes;
+  return {std::move(causes), std::move(moves)};
 }
 
 }  // namespace alidade

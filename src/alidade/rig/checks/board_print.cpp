@@ -1,7 +1,6 @@
 #include "alidade/rig/checks/board_print.h"
 
 #include "alidade/rig/checks/rig_score.h"
-#include "alidade/rig/rig_clusters.h"
 
 namespace alidade {
 namespace {
@@ -48,20 +47,6 @@ MatrixXd print_columns(const RigProblem& problem, const Extent& extent, std::siz
   return D;
 }
 
-/// ∂ free parameters / ∂ what is tested.
-MatrixXd followed(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
-                  std::span<const double> weights, const Extent& extent) {
-  MatrixXd moved = MatrixXd::Zero(cov.rows(), num_tested);
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    if (!(weights[v] > 0.0)) continue;
-    const auto at = view_residuals(problem, solved.state, v);
-    const auto equations = view_equations(problem, solved, v);
-    if (!at || !equations) continue;
-    moved -= equations->G.transpose() * (equations->Q.transpose() * print_columns(problem, extent, v, *at));
-  }
-  return cov * moved;
-}
-
 }  // namespace
 
 std::vector<RigCause> board_print(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
@@ -76,13 +61,11 @@ std::vector<RigCause> board_print(const RigProblem& problem, const SolvedRig& so
         if (!at) return std::nullopt;
         return TestedColumns{0, print_columns(problem, extent, v, *at)};
       });
-  const MatrixXd moved = followed(problem, solved, cov, weights, extent);
   const auto add = [&](const char* name, const char* unit, const std::vector<Index>& places, double worst) {
     const auto num = static_cast<Index>(places.size());
     const auto asked = score.asked(places, worst, VectorXd::Zero(num), cov_lenses, num_given);
     if (!asked) return;
-    const VectorXd by = (moved(Eigen::all, places) * asked->size).cwiseAbs();
-    const double effect = by.cwiseQuotient(cov.diagonal().cwiseSqrt()).maxCoeff();
+    const double effect = asked->moves.cwiseAbs().cwiseQuotient(cov.diagonal().cwiseSqrt()).maxCoeff();
     const double size = num == 1 ? asked->size[0] : asked->size.norm();
     if (effect > min_effect) causes.push_back({name, size, unit, asked->sigmas});
   };

@@ -30,7 +30,7 @@ class ScoreSums {
         num_lenses_(first_lens_param(solved.state, solved.state.heads.size())),
         by_common_(MatrixXd::Zero(num_free, num + num_lenses_)),
         by_board_(solved.state.world_from_board.size(), MatrixXd::Zero(6, num + num_lenses_)),
-        score_{VectorXd::Zero(num), MatrixXd::Zero(num, num), MatrixXd::Zero(num, num_lenses_)} {}
+        score_{VectorXd::Zero(num), MatrixXd::Zero(num, num), MatrixXd::Zero(num, num_lenses_), {}} {}
 
   void add(std::size_t v, const std::optional<TestedColumns>& tested) {
     const auto at = view_residuals(problem_, solved_.state, v);
@@ -60,6 +60,7 @@ class ScoreSums {
         followed += by_board_[b].leftCols(num_).transpose() * Ldlt(solved_.system.boards[b].V).solve_each(by_board_[b]);
     score_.I -= followed.leftCols(num_);
     score_.by_lenses -= followed.rightCols(num_lenses_);
+    score_.moves = -cov * by_common_.leftCols(num_);
     return std::move(score_);
   }
 
@@ -94,8 +95,9 @@ std::optional<IndicatedChange> RigScore::asked(const std::vector<Index>& places,
   MatrixXd C = moved * cov_lenses * moved.transpose() + by_given * by_given.transpose();
   C.diagonal() += variances;
   const double chi2 = along.dot(solve_symmetric(C, along));
-  return IndicatedChange{-V * along, V.cwiseAbs2() * variances,
-                         score_sigmas(chi2, static_cast<double>(num), num_given)};
+  const VectorXd size = -V * along;
+  return IndicatedChange{size, V.cwiseAbs2() * variances, score_sigmas(chi2, static_cast<double>(num), num_given),
+                         moves(Eigen::all, places) * size};
 }
 
 RigScore rig_score(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,

@@ -20,6 +20,7 @@ struct TestedColumns {
 struct IndicatedChange {
   Eigen::VectorXd size, variance;  ///< Of each of its columns.
   double sigmas = 0.0;             ///< Of all of it together.
+  Eigen::VectorXd moves;           ///< What freeing it would change the free parameters by.
 };
 
 /// Score and information of all that is tested, everything else following. C. R. Rao, Proc. Cambridge Phil. Soc. 44,
@@ -28,6 +29,7 @@ struct RigScore {
   Eigen::VectorXd s;
   Eigen::MatrixXd I;
   Eigen::MatrixXd by_lenses;  ///< Of it with the parameters of all heads' lenses.
+  Eigen::MatrixXd moves;      ///< ∂ free parameters / ∂ what is tested, as they follow.
 
   /// Of the columns at `places` together; directions whose σ is above `worst` are not determined, and none is returned
   /// where all are. `given`: σ with which each was given, 0 as if exact. `cov_lenses` of all heads' lenses: what their

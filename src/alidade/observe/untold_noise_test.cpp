@@ -47,5 +47,33 @@ TEST(UntoldNoise, IsNamedAndNoLeverOfMetres) {
     EXPECT_FALSE(quantity.name.starts_with("lever")) << quantity.value;
 }
 
+/// A camera on a long arm: all is explained by it, and without it f is 5 % to 20 % off.
+TEST(UntoldNoise, ALeverOfMetresThatIsThereIsEstimated) {
+  constexpr int num_points = 12;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    RotationScene scene;
+    scene.width_px = wide_px;
+    scene.height_px = high_px;
+    scene.start_px = draw_points(wide_px, high_px, num_points, seed);
+    scene.lever_arm_m = {0.0, 0.0, 1.5};
+    for (int i = 0; i < num_points; ++i) scene.depth_m.push_back(10.0 + 3.5 * i);
+    scene.intrinsics = [](double) { return RotatingIntrinsics{true_k[0], true_k[1], true_k[2], true_k[3], 0.0}; };
+    scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
+    RotationLogConfig config;
+    config.source = RotationSource::head;
+    config.with_range = true;
+    config.duration_s = 20.0;
+    const RotationLog log = simulate_rotation(scene, config, seed);
+    ObserveConfig wanted;
+    wanted.width_px = wide_px;
+    wanted.height_px = high_px;
+    const ObserveReport report = observe(log, wanted);
+    ASSERT_GE(report.quantities.size(), true_k.size()) << seed;
+    for (std::size_t i = 0; i < 2; ++i)
+      EXPECT_NEAR(report.quantities[i].value, true_k[i], 5.0 * report.quantities[i].sigma) << seed << " " << i;
+    EXPECT_LT(report.quantities[0].sigma, 0.015 * true_k[0]) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -50,9 +50,11 @@ const CauseScore* best_cause(const ObserveSolution& report, bool is_no_lever) {
 bool has_absurd_lever(const ObserveSolution& report) {
   constexpr double beyond = 3.0;  // σ of what is assumed of heads
   const double most_m = beyond * CommonPrior(RotatingCamera()).sigma_lever_m;
-  return std::ranges::any_of(report.quantities, [&](const ObservedQuantity& quantity) {
-    return quantity.name.starts_with("lever_") && std::abs(quantity.value) > most_m;
-  });
+  // One that is there leaves no frames that err as a whole.
+  return report.jitter.noise_rad() > 0.0 &&
+         std::ranges::any_of(report.quantities, [&](const ObservedQuantity& quantity) {
+           return quantity.name.starts_with("lever_") && std::abs(quantity.value) > most_m;
+         });
 }
 
 }  // namespace alidade

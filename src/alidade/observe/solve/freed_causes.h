@@ -17,7 +17,8 @@ inline constexpr const char* lever_cause = "lever";
 /// with the fewest parameters: what it leaves is asked for next. Null: none is.
 [[nodiscard]] const CauseScore* best_cause(const ObserveSolution& report, bool is_no_lever = false);
 
-/// A lever was estimated that no head has: beside points whose distances are free it explains noise of the rotation.
+/// A lever was estimated that no head has, and frames err as a whole beside it: with points whose distances are free
+/// it explains a part of the rotation's noise. One that is there explains all.
 [[nodiscard]] bool has_absurd_lever(const ObserveSolution& report);
 
 }  // namespace alidade

@@ -327,7 +327,10 @@ class Places {
   [[nodiscard]] bool makes_up(const Step& step, int later_from, int later_to) const {
     const auto since_first = measured(row(step.from, later_from), row(step.to, later_to));
     const auto since_last = measured(row(step.to, later_to) - 1, row(step.to, later_to));
-    return step.image && since_first && since_last &&
+    const auto meanwhile = measured(row(step.from, later_from), row(step.to, later_to) - 1);
+    constexpr double moves_px = 0.3;  // pixels rounded to 0.1 px stay where they are while a head hardly turns
+    return step.image && since_first && since_last && meanwhile &&
+           focal_px_ * (image_by_turn_ * *meanwhile).norm() > moves_px &&
            off_by(*step.image, *since_first) < 0.5 * off_by(*step.image, *since_last);
   }
 

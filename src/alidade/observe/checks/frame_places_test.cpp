@@ -10,6 +10,7 @@
 
 #include "alidade/geometry/degree.h"
 #include "alidade/observe.h"
+#include "alidade/observe/setup.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 #include "alidade/testing/trials.h"
@@ -103,6 +104,27 @@ TEST(FramePlaces, ImagesThatAreThereTwiceAreLeftOut) {
     EXPECT_NE(report.verdict.to_add.find("the one before once more"), std::string::npos) << report.verdict.to_add;
     EXPECT_NEAR(report.quantities[0].value, true_f, 5.0 * report.quantities[0].sigma) << seed;
   }
+}
+
+/// Pixels that are rounded stay where they are while a head hardly turns: nothing is there twice.
+TEST(FramePlaces, RoundedPixelsOfASlowHeadAreNotThereTwice) {
+  constexpr double step_px = 0.1;
+  RotationScene scene;
+  scene.width_px = width;
+  scene.height_px = height;
+  scene.start_px = draw_points(width, height, 12, 2);
+  scene.intrinsics = [](double) { return RotatingIntrinsics{true_f, true_f, 320.0, 240.0, 0.0}; };
+  scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
+  RotationLogConfig config;
+  config.source = RotationSource::head;
+  config.rate_hz = 200.0;
+  config.duration_s = 20.0;
+  config.sigma_px = 0.0;
+  RotationLog log = simulate_rotation(scene, config, 2);
+  for (RotationRow& row : log.rows)
+    for (Eigen::Vector2d& px : row.px)
+      if (is_seen(px)) px = (px / step_px).array().round() * step_px;
+  EXPECT_TRUE(frame_places(log).are_as_given());
 }
 
 /// As of a film that was given a constant rate: those behind are not in the rows of their time.

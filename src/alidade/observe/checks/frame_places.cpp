@@ -52,6 +52,7 @@ class Places {
     }
     focal_px_ = std::max((high - low).maxCoeff(), 1.0);
     centre_ = 0.5 * (low + high);
+    for (std::size_t k = 0; k < cam_from_start_.size(); ++k) next_.push_back(rotated(k, k + 1));
   }
 
   [[nodiscard]] FramePlaces found() {
@@ -93,6 +94,7 @@ class Places {
     if (std::max(from, to) >= cam_from_start_.size() || segment_[from] != segment_[to] || !is_measured_[from] ||
         !is_measured_[to])
       return std::nullopt;
+    if (to == from + 1 && from < next_.size()) return next_[from];
     return log_so3(cam_from_start_[to] * cam_from_start_[from].conjugate());
   }
 
@@ -135,11 +137,12 @@ class Places {
   /// its errors are large: gaps are sought as if they were half of it. A delay is known when the images are in their
   /// rows.
   [[nodiscard]] std::optional<Path> placed_from(std::size_t first) {
-    constexpr double longer = 1.2, ready = 0.5;
+    constexpr double longer = 1.2, much_longer = 1.6, ready = 0.5;
+    constexpr std::size_t many = 300;  // a fit to so many is hardly moved by those that are new
     constexpr int passes = 4;
     std::vector<int> later(steps_.size() + 1, 0);
-    for (std::size_t num = first;; num = static_cast<std::size_t>(longer * static_cast<double>(num))) {
-      num = std::min(num, steps_.size());
+    for (auto longest = static_cast<double>(first);; longest *= longest < many ? longer : much_longer) {
+      const std::size_t num = std::min(static_cast<std::size_t>(longest), steps_.size());
       for (int pass = 0; pass < passes; ++pass) {
         if (!fit(later, num, false)) return std::nullopt;
         usual_ *= ready;
@@ -347,6 +350,7 @@ class Places {
   std::vector<Eigen::Quaterniond> cam_from_start_;
   std::vector<std::size_t> segment_;
   std::vector<bool> is_measured_;
+  std::vector<std::optional<Eigen::Vector3d>> next_;  ///< Rotation to the next row.
   Eigen::Vector2d centre_ = Eigen::Vector2d::Zero();
   double focal_px_ = 1.0;
   ImageByTurn image_by_turn_ = ImageByTurn::Zero();
@@ -357,42 +361,5 @@ class Places {
 }  // namespace
 
 FramePlaces frame_places(const RotationLog& log) { return Places(log).found(); }
-
-RotationLog placed(const RotationLog& log, const FramePlaces& places) {
-  RotationLog moved = log;
-  for (RotationRow& row : moved.rows) std::ranges::fill(row.px, Eigen::Vector2d::Constant(not_seen));
-  for (std::size_t k = 0; k < log.rows.size(); ++k) {
-    const auto to = static_cast<std::ptrdiff_t>(k) + (places.later.empty() ? 0 : places.later[k]);
-    const bool has_row = to >= 0 && to < static_cast<std::ptrdiff_t>(log.rows.size());
-    if (has_row && !std::ranges::binary_search(places.repeated, k))
-      moved.rows[static_cast<std::size_t>(to)].px = log.rows[k].px;
-  }
-  return moved;
-}
-
-Check places_check(const RotationLog& log, const FramePlaces& places) {
-  constexpr std::size_t most_named = 3;
-  std::string text;
-  int num = 0;
-  for (const FramePlaces::Gap& gap : places.missing) num += gap.num;
-  if (num > 0) {
-    text = std::to_string(num) + (num == 1 ? " frame is" : " frames are") + " missing:";
-    for (std::size_t i = 0; i < std::min(most_named, places.missing.size()); ++i)
-      text += (i == 0 ? " before " : ", ") + row_time_text(log.rows[places.missing[i].before].t_s) + " (" +
-              std::to_string(places.missing[i].num) + ")";
-    text += places.missing.size() > most_named ? " …" : "";
-    text += "; the images behind are taken with the rotation of so many rows later: number them as they were taken";
-  }
-  if (!places.repeated.empty())
-    text += (text.empty() ? "" : "; ") + std::to_string(places.repeated.size()) +
-            (places.repeated.size() == 1 ? " image is" : " images are") +
-            " the one before once more while the camera rotates, first at " +
-            row_time_text(log.rows[places.repeated.front()].t_s) + ": rejected";
-  if (places.num_inserted > 0)
-    text += "; behind " + std::to_string(places.num_inserted) +
-            " of them the images are taken with the rotation of a row earlier each: number them as they were taken";
-  return {frames_check, State::care, text,       static_cast<double>(num) + static_cast<double>(places.repeated.size()),
-          0.0,          "1",         "residuals"};
-}
 
 }  // namespace alidade

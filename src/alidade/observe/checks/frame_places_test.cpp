@@ -159,6 +159,34 @@ TEST(FramePlaces, ManyMissingImagesAreFoundTogether) {
   }
 }
 
+/// The images' clock is slow: they are in rows ever later, as if some were missing.
+TEST(FramePlaces, ASlowClockIsNamedAsThat) {
+  RotationScene scene;
+  scene.width_px = width;
+  scene.height_px = height;
+  scene.start_px = draw_points(width, height, 12, 2);
+  scene.clock_rate = 0.003;
+  scene.intrinsics = [](double) { return RotatingIntrinsics{true_f, true_f, 320.0, 240.0, 0.0}; };
+  scene.motion = [](double t_s) {
+    return Eigen::Vector3d(14.0 * degree * std::sin(1.3 * t_s), 8.0 * degree * std::sin(1.9 * t_s + 1.0), 0.0);
+  };
+  RotationLogConfig log_config;
+  log_config.source = RotationSource::head;
+  log_config.rate_hz = 30.0;
+  log_config.duration_s = 66.0;
+  log_config.sigma_px = 0.1;
+  const RotationLog log = simulate_rotation(scene, log_config, 3);
+  const ObserveReport report = observed(log);
+  ASSERT_FALSE(report.quantities.empty()) << report.verdict.sentence;
+  EXPECT_NEAR(report.quantities[0].value, true_f, 5.0 * report.quantities[0].sigma);
+  EXPECT_NE(report.verdict.to_add.find("clock"), std::string::npos) << report.verdict.to_add;
+  ObserveConfig config;
+  config.width_px = width;
+  config.height_px = height;
+  config.estimate = {"clock"};
+  for (const Check& check : observe(log, config).verdict.checks) EXPECT_NE(check.name, "frames") << check.text;
+}
+
 /// A delay, play in the gears, or a zoom moves many steps a little, or the image otherwise.
 TEST(FramePlaces, NothingIsMissingOfOtherCauses) {
   const auto num_seeds = static_cast<std::uint64_t>(testing::trials(10));

@@ -110,7 +110,7 @@ bool search_causes(const RotationLog& log, const Progress& progress, ObserveSetu
     freer.method = config.method;
   }
   if (!is_answer(again)) return false;
-  if (!config.nuisances.lever && has_absurd_lever(again)) {
+  if (!config.nuisances.lever && !config.is_no_lever && has_absurd_lever(again)) {
     config.is_no_lever = true;
     return search_causes(log, progress, config, report);
   }

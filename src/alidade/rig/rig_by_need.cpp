@@ -253,6 +253,7 @@ class ByNeed {
                                                : Eigen::Vector2d(encoder.pan_cos_rad, encoder.pan_sin_rad);
     const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h) + (is_tilt ? tilt_cos_param : pan_cos_param);
     const Eigen::Matrix2d cov = best_.rig.cov.block<2, 2>(at, at);
+    if (!(cov.determinant() > 0.0)) return 0.0;
     return score_sigmas(amplitudes.dot(cov.inverse() * amplitudes), 2.0, 0.0);
   }
 

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// What is tested, and what causes that are indicated too weakly to be named or estimated leave uncertain.
+/// What is tested, and what causes that are indicated and not estimated leave uncertain.
 struct RigCauses {
   std::vector<RigCause> all;  ///< Largest first.
   Eigen::VectorXd moves;      ///< Of the free parameters, by the one of them that moves most: counts as a σ.

@@ -152,7 +152,7 @@ TEST(FramePlaces, ImagesBehindOnesThatWereInsertedArePutInTheirRows) {
 TEST(FramePlaces, ManyMissingImagesAreFoundTogether) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     RotationLog log = log_of(seed, {}, 0.02, 1.0, 12.0);
-    for (const std::size_t row : {90, 72, 55, 37, 22}) drop(log, row, 1);
+    for (const std::size_t row : {90U, 72U, 55U, 37U, 22U}) drop(log, row, 1);
     int num = 0;
     for (const FramePlaces::Gap& gap : frame_places(log).missing) num += gap.num;
     EXPECT_EQ(num, 5) << seed;

@@ -115,16 +115,13 @@ TEST(HiddenCentre, IsInWhatPositionAndRotationShare) {
     double sigma_px, dt_s;
     Eigen::Vector2d centre_px;
   };
-  int num_good = 0;
   for (const Told& each : {Told{0, 0.5, 1.0 / 30.0, {0.0, 14.0}}, Told{6, 2.0, 0.1, {14.0, 0.0}}})
     for (std::uint64_t seed = 1; seed <= num; ++seed) {
       const Outcome outcome = told(1.0, each.num_others, each.sigma_px, true, seed, each.dt_s, each.centre_px);
-      if (outcome.result.verdict.state != State::good) continue;
-      ++num_good;
+      EXPECT_LE(outcome.result.verdict.state, State::care) << each.num_others << " " << seed;
       EXPECT_LT(outcome.most_sigmas, 5.0) << each.num_others << " " << seed;
       EXPECT_LT(outcome.nees, 4.5) << each.num_others << " " << seed;
     }
-  EXPECT_GT(num_good, 0);
 }
 
 TEST(HiddenCentre, OfARightLensCostsLittle) {

@@ -117,15 +117,17 @@ struct HiddenParam {
 constexpr std::array<HiddenParam, 3> hidden_params{
     {{"focal length", {"fx", "fy"}, 0.04}, {"centre u", {"cx", ""}, 0.02}, {"centre v", {"cy", ""}, 0.02}}};
 
+constexpr double most_hidden_sigmas = 4.0;  ///< That what no score shows may move a pose by.
+
 /// The largest error, up to any of a lens, that its score would not show, and the σ by which that moves no pose by more
 /// than 4σ. Few points before a target hardly tell a longer lens from a larger distance, or another centre from a
 /// camera that is rotated, while the camera file's σ is that of another day.
 void hide(double any, GivenNumber& given) {
-  constexpr double named_z = 3.5, unseen_z = 2.4, most_sigmas = 4.0;
+  constexpr double named_z = 3.5, unseen_z = 2.4;
   const double z = std::min(std::abs(given.z), named_z);
   given.hidden = z > 0.0 ? std::min(std::abs(given.asked / given.z) * (z + unseen_z), any) : any;
   if (!(given.moves > 0.0)) return;
-  const double counted = given.hidden / most_sigmas, by_path = 1.0 / given.moves;
+  const double counted = given.hidden / most_hidden_sigmas, by_path = 1.0 / given.moves;
   given.sigma_hidden = std::sqrt(std::max(counted * counted - by_path * by_path, 0.0));
 }
 
@@ -142,11 +144,11 @@ double moves_together(const PoseChain::Spread& spread, const Eigen::VectorXd& di
 /// each are many of that. Where an ordinary error would not show as 2σ of its score, so much counts that it moves no
 /// combination by more than 4σ; what a score beyond 2σ asks for counts as far as it is ordinary.
 void count_together(double any, double moves, GivenNumber& given) {
-  constexpr double in_doubt_z = 2.0, most_sigmas = 4.0;
+  constexpr double in_doubt_z = 2.0;
   const double ordinary = 0.5 * any, z = std::abs(given.z), sigma = z > 0.0 ? std::abs(given.asked) / z : any;
   double counted = 0.0;
   if (in_doubt_z * sigma > ordinary)
-    counted = std::sqrt(std::max(std::pow(given.hidden / most_sigmas, 2) - std::pow(moves, -2), 0.0));
+    counted = std::sqrt(std::max(std::pow(given.hidden / most_hidden_sigmas, 2) - std::pow(moves, -2), 0.0));
   if (z > in_doubt_z) counted = std::max(counted, std::abs(given.asked) / (1.0 + std::pow(sigma / ordinary, 2)));
   given.sigma_hidden = std::max(given.sigma_hidden, std::min(counted, any));
 }

@@ -23,14 +23,21 @@ namespace {
 constexpr int width = 640, height = 480;
 constexpr double true_f = 500.0;
 
+/// Of one focal length.
+RotationScene scene_of(int num_points, std::uint64_t seed) {
+  RotationScene scene;
+  scene.width_px = width;
+  scene.height_px = height;
+  scene.start_px = draw_points(width, height, num_points, seed);
+  scene.intrinsics = [](double) { return RotatingIntrinsics{true_f, true_f, 320.0, 240.0}; };
+  return scene;
+}
+
 /// Four seconds of a head that sways, 30 images a second.
 RotationLog log_of(std::uint64_t seed, const RotationFaults& faults = {}, double delay_s = 0.0, double zoom = 1.0,
                    double rate_hz = 30.0) {
   Draws draws(9000 + seed);
-  RotationScene scene;
-  scene.width_px = width;
-  scene.height_px = height;
-  scene.start_px = draw_points(width, height, 40, 100 + seed);
+  RotationScene scene = scene_of(40, 100 + seed);
   scene.intrinsics = [zoom](double t_s) {
     const double f = true_f * (t_s < 2.0 ? 1.0 : zoom);
     return RotatingIntrinsics{f, f, 320.0, 240.0};
@@ -109,11 +116,7 @@ TEST(FramePlaces, ImagesThatAreThereTwiceAreLeftOut) {
 /// Pixels that are rounded stay where they are while a head hardly turns: nothing is there twice.
 TEST(FramePlaces, RoundedPixelsOfASlowHeadAreNotThereTwice) {
   constexpr double step_px = 0.1;
-  RotationScene scene;
-  scene.width_px = width;
-  scene.height_px = height;
-  scene.start_px = draw_points(width, height, 12, 2);
-  scene.intrinsics = [](double) { return RotatingIntrinsics{true_f, true_f, 320.0, 240.0, 0.0}; };
+  RotationScene scene = scene_of(12, 2);
   scene.motion = [](double t_s) { return paper_pan_tilt(t_s, 0.0); };
   RotationLogConfig config;
   config.source = RotationSource::head;
@@ -161,12 +164,8 @@ TEST(FramePlaces, ManyMissingImagesAreFoundTogether) {
 
 /// The images' clock is slow: they are in rows ever later, as if some were missing.
 TEST(FramePlaces, ASlowClockIsNamedAsThat) {
-  RotationScene scene;
-  scene.width_px = width;
-  scene.height_px = height;
-  scene.start_px = draw_points(width, height, 12, 2);
+  RotationScene scene = scene_of(12, 2);
   scene.clock_rate = 0.003;
-  scene.intrinsics = [](double) { return RotatingIntrinsics{true_f, true_f, 320.0, 240.0, 0.0}; };
   scene.motion = [](double t_s) {
     return Eigen::Vector3d(14.0 * degree * std::sin(1.3 * t_s), 8.0 * degree * std::sin(1.9 * t_s + 1.0), 0.0);
   };

@@ -177,9 +177,10 @@ void note_ungiven(const ObserveSolution& report, const std::vector<RotationError
 /// Asked for, but as no head has it: what asks for it is something else. Its share of σ stays.
 void drop_lever(ObserveSolution& report) {
   std::erase_if(report.causes, [](const CauseScore& cause) { return cause.name.starts_with(lever_cause); });
-  report.side_checks.push_back({"no lever", State::good,
-                                "a lever would explain the residuals, but of a metre or more: it is not estimated", 0.0,
-                                0.0, "", "residuals"});
+  report.side_checks.push_back(
+      {"no lever", State::good,
+       "a lever would explain the residuals, but of 0.9 m or more: it is not estimated (--estimate lever does)", 0.0,
+       0.0, "", "residuals"});
 }
 
 void note_assumed(ObserveSolution& report) {

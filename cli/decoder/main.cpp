@@ -59,6 +59,13 @@ std::string with_password(const std::string& source) {
   return source.substr(0, at) + ":" + percent_encoded(password) + source.substr(at);
 }
 
+/// A server that shows no certificate of an authority gets no password: of this machine's authorities, or of those in
+/// SSL_CERT_FILE, as OpenSSL and curl have it.
+void believe_only_known(AVDictionary** options) {
+  av_dict_set(options, "tls_verify", "1", 0);
+  if (const char* authorities = std::getenv("SSL_CERT_FILE")) av_dict_set(options, "ca_file", authorities, 0);
+}
+
 class Input {
  public:
   ~Input() {
@@ -87,6 +94,7 @@ class Input {
       url = with_password(source);
       av_dict_set(&options, "fflags", "nobuffer", 0);
       av_dict_set(&options, "timeout", "5000000", 0);  // of silence, µs
+      believe_only_known(&options);
     } else {
       av_dict_set(&options, "protocol_whitelist", "file", 0);  // a play list leads nowhere else
       av_dict_set(&options, "pattern_type", "none", 0);        // '%' in a name is itself

@@ -157,9 +157,10 @@ void VideoProcess::read_header() {
     return;
   }
   if (is_stream_)
-    throw InputError(video_.string() +
-                     ": no images arrive: nothing answers, or what answers is no video, or "
-                     "another program has the camera");
+    throw InputError(video_.string() + ": no images arrive: nothing answers, or what answers is no video, or " +
+                     (video_.string().starts_with("https:")
+                          ? "its certificate is not one that this machine trusts (SSL_CERT_FILE=FILE: authorities)"
+                          : "another program has the camera"));
   throw InputError(video_.string() + ": not a video that can be read");
 }
 

@@ -5,12 +5,15 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "alidade/files/files.h"
+#include "alidade/images/video_process.h"
 #include "alidade/testing/temporary_folder.h"
+#include "alidade/testing/tls_server.h"
 
 namespace alidade {
 namespace {
@@ -244,6 +247,19 @@ TEST(VideoFrames, RefuseFilesThatAreNoVideo) {
   for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * i * 31 + i / 7);
   write_file(file, bytes);
   EXPECT_THAT(refusal_of(file), HasSubstr("not a video that can be read"));
+}
+
+/// So many frames of a film, by an encrypted connection.
+TEST(VideoProcess, AServerWhoseCertificateNobodyKnowsIsNotBelieved) {
+  if (!testing::TlsServer::is_installed()) GTEST_SKIP() << "openssl is not installed: openssl";
+  const testing::TlsServer server("-WWW");
+  write_file(server.folder() / "film.y4m", raw_video(std::vector<int>(300, 50)));
+  const StreamAddress address{fmt::format("https://127.0.0.1:{}/film.y4m", server.port()), ""};
+  const std::string refused = refusal([&] { (void)VideoProcess(address, FrameColour::grey); });
+  EXPECT_THAT(refused, HasSubstr("certificate is not one that this machine trusts"));
+  ::setenv("SSL_CERT_FILE", server.certificate().c_str(), 1);
+  EXPECT_EQ(refusal([&] { EXPECT_FALSE(VideoProcess(address, FrameColour::grey).next().empty()); }), "");
+  ::unsetenv("SSL_CERT_FILE");
 }
 
 }  // namespace

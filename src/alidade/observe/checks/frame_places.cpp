@@ -53,6 +53,9 @@ class Places {
     focal_px_ = std::max((high - low).maxCoeff(), 1.0);
     centre_ = 0.5 * (low + high);
     for (std::size_t k = 0; k < cam_from_start_.size(); ++k) next_.push_back(rotated(k, k + 1));
+    std::vector<std::optional<Turn>> turns;
+    for (std::size_t k = 0; k < next_.size(); ++k) turns.push_back(measured(k, k + 1));
+    next_turn_ = std::move(turns);
   }
 
   [[nodiscard]] FramePlaces found() {
@@ -100,6 +103,7 @@ class Places {
 
   /// With how it changes from row to row, which a delay of less than a row adds.
   [[nodiscard]] std::optional<Turn> measured(std::size_t from, std::size_t to) const {
+    if (to == from + 1 && from < next_turn_.size()) return next_turn_[from];
     const auto now = rotated(from, to);
     if (!now) return std::nullopt;
     Turn turn = Turn::Zero();
@@ -276,10 +280,13 @@ class Places {
     for (const auto& [later, way] : ways) {
       if (way.cost > least + beam) continue;
       const auto go = [&, later = later, cost = way.cost](int to) {
-        if (const auto own = cost_of(step, later, to)) offer(next, to, cost + change_cost(to - later) + *own, later);
+        const auto own = cost_of(step, later, to);
+        if (own) offer(next, to, cost + change_cost(to - later) + *own, later);
+        return own;
       };
-      for (int num = 0; num <= num_same; ++num) go(later - num);
-      if (!moves || way.cost > least + open || cost_of(step, later, later).value_or(0.0) < fits) continue;
+      const double as_before = go(later).value_or(0.0);
+      for (int num = 1; num <= num_same; ++num) go(later - num);
+      if (!moves || way.cost > least + open || as_before < fits) continue;
       for (int num = 1; num <= most_missing; ++num) go(later + num);
     }
     return next;
@@ -350,7 +357,8 @@ class Places {
   std::vector<Eigen::Quaterniond> cam_from_start_;
   std::vector<std::size_t> segment_;
   std::vector<bool> is_measured_;
-  std::vector<std::optional<Eigen::Vector3d>> next_;  ///< Rotation to the next row.
+  std::vector<std::optional<Eigen::Vector3d>> next_;  ///< Rotation to the next row,
+  std::vector<std::optional<Turn>> next_turn_;        ///< with its change.
   Eigen::Vector2d centre_ = Eigen::Vector2d::Zero();
   double focal_px_ = 1.0;
   ImageByTurn image_by_turn_ = ImageByTurn::Zero();

@@ -14,44 +14,44 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// σ of the beam from the first `num` shots of a random order.
+/// σ of the beam estimated from the first `num_shots` shots in random order.
 struct CountedSigma {
   int num_shots = 0;
-  double sigma_origin_m = 0.0, sigma_direction_rad = 0.0;  ///< √trace of the estimate's covariances.
-  double bound_origin_m = 0.0, bound_direction_rad = 0.0;  ///< √trace of the Cramér–Rao bound's.
+  double sigma_origin_m = 0.0, sigma_direction_rad = 0.0;  ///< √trace of the covariance of the estimate.
+  double bound_origin_m = 0.0, bound_direction_rad = 0.0;  ///< √trace of the Cramér–Rao bound.
 };
 
 /// A shot predicted from all others (leave-one-out); NaN where there is nothing to compare.
 struct LeftOutShot {
   std::size_t index = 0;
-  double residual_range_m = 0.0;  ///< Predicted from its board − read.
-  Eigen::Vector2d residual_px;    ///< Predicted from its reading − seen.
+  double residual_range_m = 0.0;  ///< Predicted from the board − reading.
+  Eigen::Vector2d residual_px;    ///< Predicted from the reading − observed.
 };
 
 /// What was seen in the photo of one shot.
 struct ShotPhoto {
   bool has_photo = false;
-  std::string fault;    ///< Not readable, or of another size than the camera's; empty otherwise.
-  std::string no_spot;  ///< Why there is none; empty where there is one, or where none was looked for.
+  std::string fault;    ///< Why the photo cannot be used: unreadable, or not of the camera's size; empty otherwise.
+  std::string no_spot;  ///< Why there is no spot; empty if there is one, or if none was searched for.
   std::optional<LaserSpot> spot = {};
-  std::string false_spot = {};  ///< What was taken for the spot at first, and why it is none; empty: nothing.
+  std::string false_spot = {};  ///< A light first taken for the spot, and why it is not the spot; empty: none.
 };
 
-/// Everything that a calibration of a rangefinder has to say: what the solve found (beam, camera, shots …), and what it
-/// is worth. `by_count`, `left_out` and `gains` are empty where there is no beam.
+/// The result of rangefinder(): the estimate (beam, camera, shots …) and the study of its quality. `by_count`,
+/// `left_out` and `gains` are empty where no beam could be estimated.
 struct RangefinderCalibration : RangefinderReport {
-  std::vector<Shot> measured;     ///< One a placement, with what their photos gave; `shots` says what became of each.
-  std::vector<ShotPhoto> photos;  ///< One per shot, where photos were looked at.
-  std::vector<Shot> unreadable;   ///< Shots whose photos could not be used; `counts.skipped` says why, in order.
-  std::vector<SkippedInput> repeated;  ///< Averaged with the first of their placement; in `counts.skipped`, too.
-  RangefinderConfig config;            ///< As used: a scale that nobody gave may be estimated.
-  Eigen::MatrixXd covariance;  ///< Of origin, direction (singular along itself) and scale: embedded_covariance().
+  std::vector<Shot> measured;     ///< One per placement, with detections from its photos; for their use see `shots`.
+  std::vector<ShotPhoto> photos;  ///< One per shot; empty if no photos were searched.
+  std::vector<Shot> unreadable;   ///< Shots with unusable photos; reasons in `counts.skipped`, in the same order.
+  std::vector<SkippedInput> repeated;  ///< Averaged with the first shot of their placement; also in `counts.skipped`.
+  RangefinderConfig config;            ///< As used: `estimate_scale` may have been set.
+  Eigen::MatrixXd covariance;          ///< Origin, direction (singular along itself), scale: embedded_covariance().
   std::vector<std::string> parameter_names;  ///< Of `covariance`.
   std::vector<CountedSigma> by_count;        ///< σ against the number of shots.
-  std::vector<LeftOutShot> left_out;         ///< Each shot predicted by the others.
-  std::vector<ShotGain> gains;               ///< Of the next shot.
+  std::vector<LeftOutShot> left_out;         ///< Each shot predicted from the others.
+  std::vector<ShotGain> gains;               ///< Expected σ for candidate next shots.
   std::vector<Assumption> assumed;
-  Counts counts;  ///< Of shots.
+  Counts counts;  ///< Number of shots.
   Verdict verdict;
 };
 

@@ -9,27 +9,27 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A shot behind what is known, whose board's pose was found.
+/// A shot that the current estimate already includes, whose board pose was found.
 struct TakenShot {
   double range_m = 0.0;
   Rigid3 cam_from_board;
   bool has_spot = false;
 };
 
-/// What is known of the beam, and what the next shots will be measured with.
+/// What is known of the beam, and how the next shots will be measured.
 struct BeamNow {
-  Beam beam;      ///< With covariance, and covariance with the lens.
-  Camera camera;  ///< With covariance where known.
+  Beam beam;      ///< With its covariance, and its covariance with the lens.
+  Camera camera;  ///< With its covariance where known.
   std::vector<Eigen::Vector3d> points_in_board;
   RangefinderMethod method = RangefinderMethod::joint;
   Refine refine = Refine::all;
-  /// Whether the next shots will have a spot and a board: as those behind it have.
+  /// Whether the next shots will have a spot and a board: set as in the shots taken so far.
   bool sees_spots = true, sees_boards = true;
   double sigma_spot_px = 0.3;
   double sigma_corner_px = 0.2;
   bool estimate_scale = false;
-  std::vector<TakenShot> taken = {};  ///< For what they say of distortion that was held. May be empty.
-  CountedSheet sheet = {};            ///< Of what `beam.cov` has of it, and what shots leave open of it.
+  std::vector<TakenShot> taken = {};  ///< They add information about distortion that was fixed. May be empty.
+  CountedSheet sheet = {};            ///< The sheet included in `beam.cov`, and its uncertainty after the shots.
 };
 
 struct ShotLimits {
@@ -37,23 +37,23 @@ struct ShotLimits {
   double max_tilt_rad = 0.78;
 };
 
-/// A pose for the board, and what would be known with it.
+/// A board pose to measure next, and the expected uncertainty.
 struct NextShot {
-  double distance_m = 0.0;   ///< Along the beam, as read.
-  double tilt_rad = 0.0;     ///< Between the board's normal and the camera's view.
-  double azimuth_rad = 0.0;  ///< Which side is farther: 0 right, ½π the lower.
+  double distance_m = 0.0;   ///< Along the beam, as the rangefinder reads it.
+  double tilt_rad = 0.0;     ///< Between the board's normal and the optical axis.
+  double azimuth_rad = 0.0;  ///< Which side is farther: 0 right, ½π lower.
   Rigid3 cam_from_board;
-  double sigma_origin_m = 0.0, sigma_direction_rad = 0.0;  ///< With it and the ones before.
-  double spot_sigma_px = 0.0;                              ///< Worst over the four ranges of the bound.
+  double sigma_origin_m = 0.0, sigma_direction_rad = 0.0;  ///< Including this shot and those before it.
+  double spot_sigma_px = 0.0;                              ///< Largest at the four bound_ranges_m.
 };
 
-/// The shots that lower the uncertainty most, one after the other: each the best over distances, tilts and sides by the
-/// mean variance of the points that the beam will measure from its origin to the farthest range. Fewer where no other
-/// is left that rangefinder() would not average with one of these.
+/// The shots that lower the uncertainty most, chosen greedily: each is the best over distances, tilts and azimuths by
+/// the mean variance of the points that the beam will measure between its origin and the farthest range. Fewer than
+/// `num_shots` where every other candidate would be averaged with one of these by rangefinder().
 [[nodiscard]] std::vector<NextShot> plan_next_shots(const BeamNow& now, const ShotLimits& limits, int num_shots,
                                                     const Progress& progress = {});
 
-/// What each distance × tilt would bring as the next shot, best side each: √ of the mean variance after it. [m]
+/// Expected uncertainty after one more shot at this distance and tilt, best azimuth: √ of the mean variance [m].
 struct ShotGain {
   double distance_m = 0.0, tilt_rad = 0.0;
   double sigma_point_m = 0.0;

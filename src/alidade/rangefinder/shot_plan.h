@@ -19,20 +19,20 @@ struct ShotConfig {
 
 [[nodiscard]] FieldList fields_of(ShotConfig& config);
 
-/// The shots to take next, in their order.
+/// The shots to take next, in order.
 struct ShotPlan {
   BeamNow now;
   std::vector<NextShot> shots;
-  std::vector<Assumption> assumed;  ///< What the shots to come will not have either.
+  std::vector<Assumption> assumed;  ///< What the next shots are assumed to lack too: spots or a board.
   Counts counts;
   Verdict verdict;
 };
 
-/// The shots that lower the uncertainty of the beam most, one after the other. Throws ConfigError for an invalid
-/// config or beam.
+/// The shots that lower the uncertainty of the beam most, chosen greedily. Throws ConfigError for an invalid config or
+/// beam.
 [[nodiscard]] ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config = {}, const Progress& progress = {});
 
-/// What a calibration knows of its beam; a board of 9×6 with squares of 40 mm where it had none.
+/// The inputs of plan_shots() from a calibration; without a board in `config`, a 9×6 board with 40 mm squares.
 [[nodiscard]] BeamNow beam_now(const RangefinderReport& report, const RangefinderConfig& config);
 
 ALIDADE_PUBLIC_END

@@ -12,18 +12,18 @@
 #include "alidade/imaging/photos.h"
 #include "alidade/public.h"
 
-/// Calibration of a camera by a board: the whole job, as `alidade calibrate` does it. Its result has the camera with
-/// its covariance, the poses of the board, what was rejected and why, and a verdict.
+/// Calibration of a camera from photos of a board: the whole job, as `alidade calibrate` does it. The result contains
+/// the camera with its covariance, the poses of the board, what was rejected and why, and a verdict.
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// From photos: the corners are found, the camera is solved, the corners are found again with it, and all is solved,
-/// studied and judged. Photos that show no board are named in `counts.skipped`. Throws ConfigError for an invalid
-/// config or board, Interrupted where `progress` returns false; never for what the photos show.
+/// From photos: detects the corners, estimates the camera, detects the corners again with it, estimates all again,
+/// and judges the result. Photos that show no board are listed in `counts.skipped`. Throws ConfigError
+/// for an invalid config or board, Interrupted where `progress` returns false; never because of what the photos show.
 [[nodiscard]] Calibration calibrate(const Photos& photos, const Board& board, const CalibrateConfig& config = {},
                                     const Progress& progress = {});
 
-/// From corners detected by other means, in images of that size.
+/// From corners that were detected by other means, in images of size `size`.
 [[nodiscard]] Calibration calibrate(std::vector<BoardView> views, const ImageSize& size, const Board& board,
                                     const CalibrateConfig& config = {}, const Progress& progress = {});
 

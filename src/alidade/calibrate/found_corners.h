@@ -7,23 +7,23 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The corners of a board in photos, each with its total covariance: that of its fit and, where a calibration of the
-/// photos converges, the excess that its residuals show.
+/// The corners of a board in photos, each with its total covariance: that of the corner fit and, if a calibration from
+/// the photos converges, the excess noise estimated from its residuals.
 struct FoundCorners {
-  std::vector<BoardView> board_views;  ///< One per photo; without the rejected ones.
+  std::vector<BoardView> board_views;  ///< One per photo; without the rejected corners.
   ImageSize size;
-  std::size_t num_corners = 0, num_photos = 0;  ///< With corners.
-  std::vector<std::string> rejected;            ///< "left.jpg: corner 7", of photos that are used.
-  std::size_t num_rejected = 0;                 ///< All of them.
-  double sigma_px = 0.0;                        ///< Of one coordinate, the median.
-  double excess_px = 0.0;                       ///< Found in the residuals, and added.
+  std::size_t num_corners = 0, num_photos = 0;  ///< Accepted corners, and photos that have any.
+  std::vector<std::string> rejected;            ///< "left.jpg: corner 7"; only for photos that are used.
+  std::size_t num_rejected = 0;                 ///< Including corners of photos that are not used.
+  double sigma_px = 0.0;                        ///< σ of one coordinate, median over the corners.
+  double excess_px = 0.0;                       ///< σ estimated from the residuals and added, per coordinate.
   bool has_excess = false;
-  Calibration calibration;  ///< Its corners with the excess as well.
-  Counts counts;            ///< Of photos.
+  Calibration calibration;  ///< Its corners include the excess as well.
+  Counts counts;            ///< Number of photos.
   Verdict verdict;
 };
 
-/// Finds them. `config.outliers` keep: nothing is rejected. Throws as calibrate() does.
+/// Finds the corners. With `config.outliers` keep, nothing is rejected. Throws as calibrate() does.
 [[nodiscard]] FoundCorners find_corners(const Photos& photos, const Board& board, const CalibrateConfig& config = {},
                                         const Progress& progress = {});
 

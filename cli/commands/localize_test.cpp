@@ -215,6 +215,9 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
   bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [2, 0, 0, 0]\n", "has the length 2, not 1");
   bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [1, 0, 0, 0]\nsigma_rate_rad_s: -1\n",
            "is not above zero");
+  bad_file("--start",
+           "position_m: [0, 0, 0]\nquaternion_wxyz: [1, 0, 0, 0]\ndepths: [{id: 4, depth_m: 1}, {id: 4, depth_m: 2}]\n",
+           "depths[1].id: 4 appears twice");
   bad_file("--truth", "0 1 2 3\n", "is not 't x y z qx qy qz qw'");
 }
 

@@ -113,15 +113,17 @@ void add_faults(const LocalizeStart& start, Sentences& found) {
   const CameraMotion& motion = start.motion;
   const Rigid3& pose = motion.world_from_cam;
   if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1.0) < 1e-3))
-    found.emplace_back("the start's pose is none");
+    found.emplace_back("the start's pose must be finite, with a quaternion of length 1");
   if (!motion.velocity_in_world.allFinite() || !motion.rate_in_cam.allFinite())
     found.emplace_back("the start's speeds are not finite");
   if (!start.cov.allFinite() || !(start.cov.diagonal().minCoeff() >= 0.0))
-    found.emplace_back("the start's covariance is none");
+    found.emplace_back("the start's covariance must be finite, with a diagonal not below 0");
   if (!(start.depth_m >= 0.0) || !std::isfinite(start.depth_m)) found.emplace_back("the start's depth_m is below 0");
   if (!(start.sigma_depth > 0.0) || !std::isfinite(start.sigma_depth))
     found.emplace_back("the start's sigma_depth is not above 0");
+  std::set<long> ids;
   for (const GivenDepth& depth : start.depths) {
+    if (!ids.insert(depth.id).second) found.push_back(fmt::format("the start gives point {} two depths", depth.id));
     const bool is_good = depth.depth_m > 0.0 && depth.sigma_rel > 0.0 && std::isfinite(depth.depth_m / depth.sigma_rel);
     if (!is_good) found.push_back(fmt::format("the depth of point {}, or its sigma, is not above 0", depth.id));
   }

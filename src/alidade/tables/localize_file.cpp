@@ -157,9 +157,11 @@ LocalizeStart read_start(const std::filesystem::path& file) {
   read.depth_m = positive(fields, "depth_m", 0.0);
   read.sigma_depth = positive(fields, "sigma_depth", 0.5);
   if (!fields.has("depths")) return read;
+  std::set<long> ids;
   for_each_of(root["depths"], name, "depths", [&](const Fields& depth) {
     detail::refuse_unknown_keys(depth, {"id", "depth_m", "sigma_rel"}, "a depth");
     const GivenDepth given{id_of(depth), depth.number("depth_m"), positive(depth, "sigma_rel", 0.5)};
+    if (!ids.insert(given.id).second) refuse(name, depth.full("id"), fmt::format("{} appears twice", given.id));
     if (!(given.depth_m > 0.0)) refuse(name, depth.full("depth_m"), "is not above zero");
     read.depths.push_back(given);
   });

@@ -31,15 +31,15 @@ struct Plane {
   return plane;
 }
 
-/// Where the laser's spot was seen.
+/// An observed laser spot.
 struct Spot {
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< With distortion: as in the photo.
-  std::optional<double> sigma_px = {};           ///< Of a coordinate.
-  bool sigma_is_least = false;  ///< It is what the finder knows of; speckle, Bayer and JPEG come on top.
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Distorted pixel, as in the photo.
+  std::optional<double> sigma_px = {};           ///< σ of one coordinate.
+  bool sigma_is_least = false;  ///< A lower bound: what the detector knows of; speckle, Bayer and JPEG add to it.
 };
 
-/// One reading of the rangefinder and what was seen of it. Of the board at most one is needed: its corners, else its
-/// pose, else its plane; the first that is there counts.
+/// One reading of the rangefinder and its observations. At most one observation of the board is needed: its corners,
+/// pose or plane; the first one present, in that order, is used.
 struct Shot {
   double range_m = 0.0;
   std::optional<double> sigma_range_m = {};
@@ -47,11 +47,11 @@ struct Shot {
   std::optional<BoardView> board = {};
   std::optional<BoardPose> pose = {};
   std::optional<Plane> plane = {};
-  std::string name = {};  ///< For display: a row or a photo.
-  /// Photos of the board with the laser on and, where there is one, off; as the table names them. Empty: none.
+  std::string name = {};  ///< For display: a table row or a photo.
+  /// File names, as in the table, of the photos with the laser on and, if there is one, off. Empty: none.
   std::string photo = {}, photo_off = {};
-  std::string no_board = {};  ///< Why the photo gives none, where that is known.
-  std::string table = {};     ///< Where the shot comes from, and its line there; empty: from no file.
+  std::string no_board = {};  ///< Why the photo shows no board, where known.
+  std::string table = {};     ///< The table that the shot was read from, and its line there; empty: not from a file.
   std::size_t line = 0;
 
   [[nodiscard]] bool has_plane() const { return board || pose || plane; }

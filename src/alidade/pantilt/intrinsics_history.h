@@ -12,16 +12,16 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Intrinsics of a camera at one instant: fx, fy, cx, cy, and σ of each. [px]
+/// Intrinsics of a camera at one instant: fx, fy, cx, cy, with the σ of each. [px]
 struct IntrinsicsSample {
   Eigen::Vector4d k = Eigen::Vector4d::Zero();
   Eigen::Vector4d sigma = Eigen::Vector4d::Zero();
 };
 
-/// The intrinsics of a camera file, with its σ; without a covariance zero.
+/// The intrinsics of a camera file with their σ; zero σ without a covariance.
 [[nodiscard]] IntrinsicsSample own_lens(const Camera& camera);
 
-/// From a camera's own intrinsics to others, its skew and distortion about them: px = c + (f / f_own) (px_own − c_own).
+/// Maps pixels from a camera's own intrinsics to others, keeping skew and distortion: c + (f / f_own) (px_own − c_own).
 struct Zoomed {
   Zoomed(const Camera& camera, const Eigen::Vector4d& k);
 
@@ -35,14 +35,14 @@ struct Zoomed {
   }
 };
 
-/// Intrinsics over time, as `alidade observe` estimates them of a head's camera.
+/// Intrinsics of a head's camera over time, as estimated by `alidade observe`.
 struct IntrinsicsHistory {
-  std::string name;                    ///< Of the file, for messages.
+  std::string name;                    ///< File name, for messages.
   std::vector<double> t_s;             ///< Ascending.
-  std::vector<IntrinsicsSample> lens;  ///< One per time; none where the camera's own intrinsics are used.
-  double from_s = 0.0, until_s = 0.0;  ///< What the observer's log spans.
+  std::vector<IntrinsicsSample> lens;  ///< One per time; empty where the camera's own intrinsics are used.
+  double from_s = 0.0, until_s = 0.0;  ///< Time span of the observer's log.
 
-  /// Linear between the times, constant before the first and after the last.
+  /// Linear interpolation between the times, constant before the first and after the last.
   [[nodiscard]] IntrinsicsSample at(double at_s) const;
 };
 

@@ -11,32 +11,32 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// σ of a head's encoders beside its readings' noise, where a file gives it; NaN: not given, 0: exact.
+/// σ of a head's encoder zeros and scales (not the noise of readings), from a file; NaN: not given, 0: exact.
 struct EncoderError {
   double sigma_zero_rad = std::numeric_limits<double>::quiet_NaN();
   double sigma_scale = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// One head or more in one world: what `alidade rig` estimates and rig.yaml holds.
+/// One or more heads in one world frame: what `alidade rig` estimates and rig.yaml contains.
 struct Rig {
   std::vector<RigHead> heads;
-  /// Covariance of the parameters of all heads, one head after the other, each as head_param_names (what is fixed has
-  /// zero rows); 0×0 where unknown, all zero where the heads are exact.
+  /// Covariance of the parameters of all heads, head by head, each in the order of head_param_names (zero rows if
+  /// fixed); 0×0 if unknown, all zero if the heads are exact.
   Eigen::MatrixXd cov;
-  /// The same followed by the parameters of all lenses, head by head: what the heads share with the lenses that they
-  /// were calibrated through. 0×0 where that is not known; each lens then has its own camera's covariance.
+  /// The same followed by the parameters of all lenses, head by head: the joint covariance of the heads and the lenses
+  /// they were calibrated with. 0×0 if unknown; the covariance of each lens is then that of its own camera.
   Eigen::MatrixXd cov_with_lenses;
   std::vector<EncoderError> encoder_errors;             ///< One per head, or none.
-  std::vector<IntrinsicsHistory> intrinsics_histories;  ///< One per head, or none: of cameras that zoom.
-  /// What read_rig() found that is not as it was when the rig was calibrated: no answer by it is good.
+  std::vector<IntrinsicsHistory> intrinsics_histories;  ///< For zooming cameras: one per head, or none.
+  /// What read_rig() found to differ from the time of the calibration: results based on this rig are not reliable.
   std::vector<std::string> doubts;
 };
 
-/// What to do about a rig's doubts.
+/// What to do about Rig::doubts.
 inline constexpr const char* rig_doubts_remedy =
     "calibrate the rig again with that camera (alidade rig); or, if it is meant, remove camera_values of that head";
 
-/// What is wrong with a head or a rig that a program made, in one sentence; empty where nothing is.
+/// What is wrong with a head or a rig built by a program, in one sentence; empty if nothing is wrong.
 [[nodiscard]] std::string fault(const RigHead& rig_head);
 [[nodiscard]] std::string fault(const Rig& rig);
 

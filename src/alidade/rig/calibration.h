@@ -10,18 +10,18 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The result of rig(): what the solve found (rig, boards, views …), with its covariance, counts and
+/// The result of rig(): what was estimated (rig, boards, views …), with its covariance, counts and
 /// verdict.
 struct RigCalibration : RigReport {
-  std::vector<HeadView> measured;  ///< One a stop, with the corners of its photos; `views` says what became of each.
-  std::vector<SkippedInput> no_board;       ///< Photos that show no board, or cannot be used; in `counts.skipped`, too.
-  std::vector<SkippedInput> unreadable;     ///< Of these, photos that cannot be used.
-  std::vector<SkippedInput> wrong_corners;  ///< Of views that are used without them; in `counts.skipped`, too.
-  std::vector<SkippedInput> repeated;       ///< Views averaged with the first of their stop; in `counts.skipped`, too.
+  std::vector<HeadView> measured;        ///< One per stop, with the corners from its photos; see `views` for their use.
+  std::vector<SkippedInput> no_board;    ///< Photos without a board, or unusable; also in `counts.skipped`.
+  std::vector<SkippedInput> unreadable;  ///< Those of them that are unusable.
+  std::vector<SkippedInput> wrong_corners;  ///< Rejected corners of used views; also in `counts.skipped`.
+  std::vector<SkippedInput> repeated;  ///< Views averaged with the first view of their stop; also in `counts.skipped`.
   RigConfig config;
-  Eigen::MatrixXd covariance;                ///< Of all heads: rig.cov.
+  Eigen::MatrixXd covariance;                ///< Of all heads; equals rig.cov.
   std::vector<std::string> parameter_names;  ///< Of `covariance`: "head1.base_x_m", …
-  Counts counts;                             ///< Of views.
+  Counts counts;                             ///< Number of views.
   Verdict verdict;
 };
 

@@ -13,29 +13,29 @@ ALIDADE_PUBLIC_BEGIN
 
 /// Options of rig(). Plain data; the board must be given.
 struct RigConfig {
-  std::optional<double> sigma_px = {};           ///< Of a corner's coordinate; none: estimated from the residuals.
+  std::optional<double> sigma_px = {};           ///< Of a corner coordinate; none: estimated from the residuals.
   std::optional<double> sigma_encoder_rad = {};  ///< Of a reading; none: estimated from the residuals.
-  std::optional<Board> board = {};               ///< Static while the heads observed it.
-  bool estimate_scales = false;                  ///< Radians of the axes for each radian read.
-  bool estimate_once = false;                    ///< An error of one period per revolution of each axis.
-  bool estimate_backlash = false;                ///< Views stand in the order in which they were taken.
-  bool estimate_focal = false;                   ///< Of each lens, both by one factor; its file is an initial guess.
+  std::optional<Board> board = {};               ///< It must not move while the heads observe it.
+  bool estimate_scales = false;                  ///< Scale: axis angle per radian read.
+  bool estimate_once = false;                    ///< Encoder error with one period per revolution, each axis.
+  bool estimate_backlash = false;                ///< Requires the views in the order in which they were taken.
+  bool estimate_focal = false;                   ///< One factor per lens for fx and fy; the file is the initial guess.
   bool estimate_centre = false;
-  /// Causes indicated by the residuals are estimated too, where the views determine them; and scales that are not
+  /// Also estimates causes that the residuals indicate, if the views determine them, and scales that are not
   /// given.
   bool estimate_by_need = true;
-  std::optional<double> sigma_square_m = {};  ///< Of the board's squares; none: not known.
-  std::optional<double> sigma_scale = {};     ///< Of the encoders' scales where they are fixed; none: not known.
-  /// Of an encoder's error within a turn, by which its scale over a part of the turn is another: counted beside
-  /// sigma_scale. 0: there is none.
+  std::optional<double> sigma_square_m = {};  ///< Side of the board's squares; none: unknown.
+  std::optional<double> sigma_scale = {};     ///< Scales of the encoders where they are fixed; none: unknown.
+  /// σ of an encoder's error within a revolution, which changes its scale over part of the revolution: added to
+  /// sigma_scale. 0: no such error.
   double sigma_within_turn_rad = 5e-4;
-  bool estimate_skew = true;  ///< Of the axes from being square to each other.
+  bool estimate_skew = true;  ///< Deviation of the axes from perpendicularity.
   bool reject_outliers = true;
 };
 
 /// The fields of `config` that a user sets: sigma_px, sigma_angle_rad, sigma_square_m, sigma_scale,
 /// sigma_within_turn_rad, estimate, scales,
-/// outliers. The board has fields of its own.
+/// outliers. The board has its own fields.
 [[nodiscard]] FieldList fields_of(RigConfig& config);
 
 /// What is wrong with the config, one sentence each; empty where it is usable.

@@ -36,8 +36,7 @@ struct NextView {
   int board = 0;                 ///< Number of the board's pose.
   bool is_new_position = false;  ///< The board must first be moved to a new place.
   Rigid3 world_from_board;       ///< Its pose: estimated, or planned if it is new.
-  Eigen::Vector2d centre_px;  ///< Threshold [σ] for freeing a parameter: lower, as a needless one only costs σ; one
-                              ///< clean rig in seven exceeds it.
+  Eigen::Vector2d centre_px;     ///< Pixel of the board's centre in that view.
   Rigid3 cam_from_board;
   double gain = 0.0;  ///< ln(σ now / σ with it) per view; a new placement is evaluated with three views.
 };

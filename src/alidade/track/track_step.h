@@ -9,24 +9,24 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What became of an observation.
+/// What was done with an observation.
 enum class TrackEvent {
   none,
-  waiting,   ///< No track yet: another head is needed to start it.
-  start,     ///< Track begun, by intersecting the rays of two heads.
-  restart,   ///< Begun again: the old one did not agree with what was seen.
+  waiting,   ///< No track yet: an observation by another head is needed to initialise it.
+  start,     ///< Track initialised by triangulation from the rays of two heads.
+  restart,   ///< Track reinitialised: the old one contradicted the observations.
   gated,     ///< Observation rejected: NIS beyond the gate.
-  depth,     ///< Observation rejected: the target would be outside the working range.
-  outside,   ///< Observation rejected: its pixel is not in the image, or not a number.
-  late,      ///< Observation rejected: older than the history.
-  one_head,  ///< Used, but only one head has seen the target for a while: its range is drifting.
-  frozen,    ///< Kept out: the row repeats the one before it, because its head's image or encoders stood still.
+  depth,     ///< Observation rejected: it would place the target outside the working range.
+  outside,   ///< Observation rejected: its pixel is outside the image, or not a number.
+  late,      ///< Observation rejected: older than the filter's history.
+  one_head,  ///< Used, but only one head has seen the target for some time: the range drifts.
+  frozen,    ///< Observation excluded: it repeats the previous row, because the head's image or encoders were frozen.
 };
 /// "", waiting, start, restart, gated, depth, outside, late, one_head, frozen.
 [[nodiscard]] std::string_view event_name(TrackEvent event);
 
-/// What became of one observation. The belief is that of the newest capture time so far, position and velocity in the
-/// world.
+/// The result for one observation. The belief is that at the newest capture time so far: position and velocity in the
+/// world frame.
 struct TrackStep {
   double t_s = 0.0;
   bool has_belief = false;
@@ -34,7 +34,7 @@ struct TrackStep {
   TrackEvent event = TrackEvent::waiting;
   bool accepted = false;
   bool has_innovation = false;
-  Innovation innovation;  ///< At the observation's own capture time.
+  Innovation innovation;  ///< At the capture time of this observation.
 };
 
 ALIDADE_PUBLIC_END

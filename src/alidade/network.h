@@ -9,24 +9,24 @@
 #include "alidade/pantilt/head_cameras.h"
 #include "alidade/public.h"
 
-/// Static cameras, located by one target that moves: the whole job, as `alidade rig --moving-target` does it.
+/// Poses of static cameras from one moving target: the whole job, as `alidade rig --moving-target` does it.
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Positions, attitudes and clocks of the cameras of `heads` (heads_with()), from their observations of the target.
-/// `truth`: the target's path by other means; empty: none. Throws ConfigError for an invalid config, heads or
-/// observations, Interrupted where `progress` returns false; never for what the observations show.
+/// Estimates position, attitude and clock of each camera of `heads` (heads_with()) from observations of the target.
+/// `truth`: the target's path from another source; empty: none. Throws ConfigError for an invalid config, heads or
+/// observations, Interrupted where `progress` returns false; never because of what the observations show.
 [[nodiscard]] NetworkCalibration network(std::vector<TargetObservation> observations, const std::vector<RigHead>& heads,
                                          const MovingTargetConfig& config, const TrueTrack& truth = {},
                                          const Progress& progress = {});
 
-/// The located heads alone, with their part of the covariance.
+/// A rig of the located heads only, with their part of the covariance.
 [[nodiscard]] Rig located_rig(const MovingTargetReport& report);
 
-/// Of a covariance of all heads, as rig.cov, the part of those that were located.
+/// The part of a covariance of all heads, ordered as rig.cov, that belongs to the located heads.
 [[nodiscard]] Eigen::MatrixXd located_part(const MovingTargetReport& report, const Eigen::MatrixXd& of_all);
 
-/// The observations of the located cameras on the rig's one clock, in order of time: what `alidade track` reads.
+/// The observations by located cameras in rig time, in chronological order: the input of `alidade track`.
 [[nodiscard]] std::vector<TargetObservation> observations_on_one_clock(const NetworkCalibration& calibration);
 
 ALIDADE_PUBLIC_END

@@ -13,14 +13,14 @@
 #include "alidade/localize/sequence.h"
 #include "alidade/public.h"
 
-/// The path of a moving camera and the map of the points that it sees: the whole job, as `alidade localize` does it.
+/// Path of a moving camera and map of the points that it sees: everything that `alidade localize` does.
 namespace alidade {
 struct MovedMapPoints;
 ALIDADE_PUBLIC_BEGIN
 
-/// From observations of numbered points, frames in order of time. Throws ConfigError for an invalid config,
-/// camera or frame, Interrupted where `progress` returns false; never for what the observations show. With `truth` the
-/// result has the path's error. Where the config says no σ of a pixel, it is estimated first, from all frames.
+/// From observations of numbered points, frames in order of time. Throws ConfigError for an invalid config, camera or
+/// frame, Interrupted if `progress` returns false, but never because of what the observations show. With `truth` the
+/// result has the path's error. If the config gives no σ of a pixel, it is estimated first, from all frames.
 [[nodiscard]] Localization localize(const ObservationTable& observations, const Camera& camera,
                                     const LocalizeConfig& config = {}, std::span<const TimedPose> truth = {},
                                     const Progress& progress = {});
@@ -28,13 +28,13 @@ ALIDADE_PUBLIC_BEGIN
                                     const LocalizeConfig& config = {}, std::span<const TimedPose> truth = {},
                                     const Progress& progress = {});
 
-/// From images, 8-bit grey and of the camera's size, in order of time: features are selected and tracked in them.
+/// From images (8-bit grey, of the camera's size, in order of time): features are selected and tracked in them.
 [[nodiscard]] Localization localize(const ImageStream& images, const Camera& camera, const LocalizeConfig& config = {},
                                     std::span<const TimedPose> truth = {}, const Progress& progress = {});
 
-/// The same, incrementally, frame by frame. push() returns the filter's pose, with 0.5 px where the config says no σ of
-/// a pixel; finish() returns what localize() returns for the same frames, to the last digit (of more than
-/// config.max_smoothed, with the σ that push() has).
+/// Incremental localize(), frame by frame. push() returns the filter's pose, with a σ of 0.5 px if the config gives
+/// none; finish() returns what localize() returns for the same frames, to the last digit (for more than
+/// config.max_smoothed frames, with the pixel σ of push()).
 class Localizer {
  public:
   /// Throws ConfigError.
@@ -43,13 +43,13 @@ class Localizer {
   Localizer(Localizer&&) noexcept;
   Localizer& operator=(Localizer&&) noexcept;
 
-  /// The next frame: observations or images, but not both. If it throws ConfigError, the state is unchanged.
+  /// Processes the next frame: observations or images, not both. The state is unchanged if it throws ConfigError.
   const PathStep& push(const ObservationFrame& frame);
   const PathStep& push(const cv::Mat& grey, long frame, double t_s);
-  /// Whether the poses that push() gave since this was last asked stand, by what the filter knows: of observations, not
-  /// of images. Where the lens is not as given they are off by many times their σ, while finish() may correct that.
+  /// Verdict of the filter on the poses that push() returned since the last call; throws ConfigError for images. If the
+  /// lens is not as given, these poses are off by many times their σ, while finish() may correct that.
   [[nodiscard]] Verdict recent();
-  /// The result so far; more may follow.
+  /// The result so far; more frames may follow.
   [[nodiscard]] Localization finish(std::span<const TimedPose> truth = {}) const;
 
  private:

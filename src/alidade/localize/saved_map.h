@@ -11,12 +11,12 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// How a point of a map of images looked when it was first seen.
+/// Appearance of a point of a map of images when it was first seen.
 struct SavedLook {
-  GreyPatch patch;                                      ///< Smoothed, as it is looked for.
-  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  ///< Of the point from the patch's centre.
+  GreyPatch patch;                                      ///< Smoothed, as it is searched for.
+  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  ///< From the patch's centre to the point.
   Rigid3 world_from_first_cam;
-  Eigen::Matrix<double, 3, 2> surface_in_world = Eigen::Matrix<double, 3, 2>::Zero();  ///< Two directions along it.
+  Eigen::Matrix<double, 3, 2> surface_in_world = Eigen::Matrix<double, 3, 2>::Zero();  ///< Two tangent directions.
   Eigen::Matrix2d J_first_px_surface = Eigen::Matrix2d::Identity();  ///< Of its first pixel by a move along them.
 };
 
@@ -27,26 +27,26 @@ struct SavedPoint {
   std::optional<SavedLook> look = {};
 };
 
-/// An image made very small, and where it was taken from.
+/// A thumbnail of an image, and the pose at which it was taken.
 struct SavedKeyframe {
   Rigid3 world_from_cam;
   GreyPatch thumbnail;
 };
 
-/// What all points of a map have in common of their errors: those of its frame, as of a target that it was made in
-/// front of.
+/// Errors that all points of a map share: those of its frame, such as the errors of the target in front of which it was
+/// made.
 struct SavedFrame {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  /// Of a translation of the map [m], a rotation about the centre [rad] and a change of size, relative.
+  /// Covariance of a translation of the map [m], a rotation about the centre [rad] and a relative change of size.
   Eigen::Matrix<double, 7, 7> cov = Eigen::Matrix<double, 7, 7>::Zero();
 };
 
-/// The map of a run, for later runs to start in: `localize --map`.
+/// The map of a run, in which later runs can start: `localize --map`.
 struct SavedMap {
   bool is_in_metres = false;
-  std::vector<SavedPoint> points = {};        ///< Their covariances are of errors beside the frame's.
+  std::vector<SavedPoint> points = {};        ///< Their covariances exclude the frame's errors.
   std::optional<SavedFrame> frame = {};       ///< None: not known.
-  std::vector<SavedKeyframe> keyframes = {};  ///< Of images.
+  std::vector<SavedKeyframe> keyframes = {};  ///< For maps of images.
 };
 
 ALIDADE_PUBLIC_END

@@ -17,38 +17,38 @@ class Mat;
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A point seen: which one, where. σ of each coordinate; 0: the config's.
+/// An observation of a point: its id and pixel. σ applies to each coordinate; 0: the config's.
 struct FeatureObservation {
   long id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.0;
 };
 
-/// What was seen of numbered points in one image.
+/// The observations of numbered points in one image.
 struct ObservationFrame {
   long frame = 0;
   double t_s = 0.0;
   std::vector<FeatureObservation> observations;
 };
 
-/// Frames in order of time, also those in which nothing was seen, and rows of their table that were rejected.
+/// Frames in order of time, including those without observations, and the rejected rows of their table.
 struct ObservationTable {
   std::vector<ObservationFrame> frames = {};
   std::vector<SkippedInput> skipped = {};
 };
 
-/// The next image, 8-bit grey, its number and time. False at the end.
+/// Reads the next image (8-bit grey), its number and its time; returns false at the end.
 using NextImage = std::function<bool(cv::Mat& grey, long& frame, double& t_s)>;
 
 /// Images in order of time.
 struct ImageStream {
   NextImage next;
   std::size_t num_images = 0;  ///< For progress; 0: not known.
-  /// Frames a second by the video's own times, of what has been read, where a rate was given instead of them; 0: none.
+  /// Rate by the video's own times so far [frames/s], where a given rate was used instead of them; 0: none.
   std::function<double()> own_rate_hz = {};
 };
 
-/// A feature searched for in an image: for drawing.
+/// A feature searched for in an image, for display.
 struct ObservationTried {
   long id = 0;
   Eigen::Vector2d expected_px = Eigen::Vector2d::Zero();
@@ -57,7 +57,7 @@ struct ObservationTried {
   bool is_used = false;
 };
 
-/// A pose at a time.
+/// A pose and its time.
 struct TimedPose {
   double t_s = 0.0;
   Rigid3 world_from_cam;

@@ -16,31 +16,31 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The linear loop that a controller closes, before anything moves.
+/// Linear analysis of the loop that a controller closes, done before the simulation.
 struct LoopCheck {
   ControllerKind controller;
   LoopAnalysis analysis;
   double loop_gain = 0.0;  ///< Error units of the gains per unit of the plant's output.
-  int delay_samples = 0;   ///< In whole periods; −1: the controller was tried, and `sampled_radius` alone is known.
-  /// RMS about a target at rest, the lens at its longest, where the loop keeps to a shorter one; 0: not tried.
+  int delay_samples = 0;   ///< In whole periods; −1: the loop was simulated, and only `sampled_radius` is known.
+  /// RMS for a target at rest, at the longest focal length, if the loop assumes a shorter one; 0: not simulated.
   double rest_px = 0.0;
-  /// RMS about its mean that is left long after the target has jumped by a quarter of the image and rests, where limits
-  /// of rate and acceleration, dead band or backlash keep the loop from rest; 0: it comes to rest, or is linear.
+  /// RMS about its mean that remains long after the target has jumped by a quarter of the image and rests, if limits of
+  /// rate and acceleration, dead band or backlash keep the loop from settling; 0: it settles, or is linear.
   double swing_px = 0.0;
-  double free_px = 0.0;        ///< The same without them.
-  std::string swings_by = {};  ///< Without which alone it rests, or all of them; empty: it rests.
-  std::size_t head = 0;        ///< Of whose lens it is the loop: the one nearest to instability.
-  std::size_t axis = 0;        ///< Of which axis: 0 pan, 1 tilt.
-  /// Largest |eigenvalue| where gain, time constant and delay of the plant are off by 3σ, each either way; 0: no σ.
+  double free_px = 0.0;        ///< The same without these nonlinearities.
+  std::string swings_by = {};  ///< The one without which it settles, or all of them; empty: it settles.
+  std::size_t head = 0;        ///< Its lens determines the loop: the head nearest to instability.
+  std::size_t axis = 0;        ///< Likewise the axis: 0 pan, 1 tilt.
+  /// Spectral radius if gain, time constant and delay of the plant are off by 3σ, worst combination; 0: no σ given.
   double radius_within_sigma = 0.0;
 
   [[nodiscard]] bool is_stable() const;
   [[nodiscard]] bool swings() const { return swing_px > 0.0; }
 };
-/// Of `pi`, round plant and image; of `feedforward` on an angle plant, the correction round plant and encoder; of all
-/// others what the controller itself does to a small offset. Each with plant, lags and delays as they are. What
-/// predicts the target from pixels that it takes by another lens is tried on a target at rest, too. Of several heads
-/// and of both axes the one nearest to instability.
+/// `pi`: the loop through plant and image; `feedforward` on an angle plant: the correction through plant and encoder;
+/// otherwise the response of the controller itself to a small offset. Each with the true plant, lags and delays. If it
+/// predicts the target from pixels with a wrong lens, it is also simulated with a target at rest. Of several heads and
+/// of both axes, the one nearest to instability is reported.
 [[nodiscard]] std::vector<LoopCheck> check_loops(const ServoScenario& scenario);
 
 struct ServoTrial {
@@ -51,15 +51,15 @@ struct ServoTrial {
 
 struct ServoComparison {
   ControllerKind controller;
-  ServoFigures figures;  ///< Of all its trials.
+  ServoFigures figures;  ///< Over all its trials.
   ServoRun shown;        ///< Its first trial, row by row.
 };
 
-/// The best controller with each kind of knowledge of a lens that zooms, over the same seeds.
+/// The best controller with each kind of knowledge of a zooming lens, with the same seeds.
 struct LensComparison {
   LensKnowledge knowledge;
   std::vector<ServoFigures> trials;  ///< One per seed.
-  ServoFigures figures;              ///< Of all of them.
+  ServoFigures figures;              ///< Over all trials.
 };
 
 struct ServoStudy {
@@ -67,28 +67,28 @@ struct ServoStudy {
   Status status = Status::unstable;
   std::vector<LoopCheck> loops;
   std::vector<ServoTrial> trials;
-  std::vector<ServoComparison> comparison;  ///< In the order of the scenario; empty where a loop is unstable.
+  std::vector<ServoComparison> comparison;  ///< In the order of the scenario; empty if a loop is unstable.
   ControllerKind best = ControllerKind::pi;
-  ServoTrack track;                           ///< Of the best one's shown run; two heads or more.
-  std::optional<ServoRobustness> robustness;  ///< Of the best.
-  std::vector<LensComparison> lenses;         ///< Where the lens zooms, or an observer estimates it; else none.
+  ServoTrack track;                           ///< From the shown run of the best controller; two heads or more.
+  std::optional<ServoRobustness> robustness;  ///< Of the best controller.
+  std::vector<LensComparison> lenses;         ///< If the lens zooms, or an observer estimates it; else empty.
 };
 
 /// Called with the rows of each controller's first trial.
 using ServoWatch = std::function<void(ControllerKind, const ServoRow&)>;
 
-/// Every controller over the same seeds. Nothing runs where check_loops finds an unstable loop.
+/// Runs every controller with the same seeds. Nothing is run if check_loops() finds an unstable loop.
 [[nodiscard]] ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed,
                                      const Progress& progress = {}, const ServoWatch& watch = {});
 
 [[nodiscard]] Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study);
 
-/// The result of servo(): figures of the controllers, and the verdict.
+/// The result of servo(): figures of merit of the controllers, and the verdict.
 struct ServoResult : ServoStudy {
   ServoScenario scenario;
-  std::uint64_t seed = 1;  ///< Of the first run.
+  std::uint64_t seed = 1;  ///< Seed of the first run.
   std::vector<Assumption> assumed;
-  Counts counts;  ///< Of trials.
+  Counts counts;  ///< Number of trials.
   Verdict verdict;
 };
 

@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Where the target was in space, as `track` estimates from what the heads of a run saw of it.
+/// Positions of the target as `track` estimates them from the observations by the heads in one run.
 struct ServoTrack {
   std::vector<TargetObservation> observations;
   TrueTrack truth;

@@ -14,14 +14,14 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A JSON value made of plain C++ ones: `value["camera"]["fx"] = 532.8`. Objects keep the order of insertion. Numbers
-/// that are not finite become null in the text.
+/// A JSON value composed of plain C++ values: `value["camera"]["fx"] = 532.8`. Objects keep the order of insertion.
+/// Numbers that are not finite become null in the text.
 class JsonValue {
  public:
   using Member = std::pair<std::string, JsonValue>;
   using List = std::vector<JsonValue>;
-  /// A type of its own: libstdc++ 12 takes a variant of its own types for one that always holds a value, and where a
-  /// copy finds no memory it would destroy what was never made.
+  /// A separate type, no alias: libstdc++ 12 takes a variant of its own types for one that always holds a value, and
+  /// if a copy runs out of memory it would destroy an object that was never constructed.
   struct Object : std::vector<Member> {
     using std::vector<Member>::vector;
   };
@@ -45,27 +45,27 @@ class JsonValue {
   JsonValue(const std::vector<bool>& flags) : content_(List(flags.begin(), flags.end())) {}
   JsonValue(const std::vector<std::string>& texts) : content_(List(texts.begin(), texts.end())) {}
 
-  /// An object without members, "{}"; a JsonValue made of nothing is null.
+  /// An object without members, "{}"; a default-constructed JsonValue is null.
   [[nodiscard]] static JsonValue object();
   [[nodiscard]] static JsonValue list() { return JsonValue(List{}); }
 
-  /// The member of that name; made if it is not there. A null becomes an object.
+  /// The member with that name; created if missing. A null becomes an object.
   JsonValue& operator[](std::string_view key);
   /// Appends to a list. A null becomes a list.
   void push_back(JsonValue value);
   [[nodiscard]] const Content& content() const { return content_; }
 
-  /// Text of the value. `indent` < 0: in one line.
+  /// Text of the value. `indent` < 0: on one line.
   [[nodiscard]] std::string text(int indent = -1) const;
 
  private:
   Content content_ = nullptr;
 };
 
-/// Of a column where a row has no value: null in a document.
+/// In a column, for a row without a value: null in a document.
 inline constexpr double missing_value = std::numeric_limits<double>::quiet_NaN();
 
-/// The numbers to so many decimals: what a reader can use, in a file of a fitting size.
+/// The numbers rounded to `decimals` decimals: as many as are useful to a reader, for a reasonable file size.
 [[nodiscard]] std::vector<double> rounded(std::vector<double> numbers, int decimals);
 
 ALIDADE_PUBLIC_END

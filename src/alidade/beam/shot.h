@@ -16,7 +16,7 @@ ALIDADE_PUBLIC_BEGIN
 struct Plane {
   Eigen::Vector3d normal_in_cam = Eigen::Vector3d::UnitZ();  ///< Unit vector.
   double d_m = 0.0;
-  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();  ///< Of (normal, d); zero: exact.
+  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();  ///< Covariance of (normal, d); zero: exact.
 };
 
 /// The board's plane z = 0, oriented away from the camera: d < 0.

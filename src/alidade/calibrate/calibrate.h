@@ -26,8 +26,8 @@ struct ViewFit {
   std::string reason;     ///< Why it was not used; empty otherwise.
   Rigid3 cam_from_board;  ///< Valid only if used.
   Eigen::Matrix<double, 6, 6> pose_cov = Eigen::Matrix<double, 6, 6>::Zero();  ///< Of the right perturbation ξ.
-  double rms_px = 0.0;                                                         ///< Per point, over the used corners.
-  std::vector<CornerResidual> corners;                                         ///< One per corner of the view.
+  double rms_px = 0.0;                  ///< RMS per point, over the used corners.
+  std::vector<CornerResidual> corners;  ///< One per corner of the view.
 };
 
 /// Another lens to which a solve of the same views may converge: a further local minimum.

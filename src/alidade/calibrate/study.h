@@ -54,7 +54,7 @@ struct CalibrationStudy {
   std::optional<Halves> halves;      ///< Empty for fewer than six photos.
   std::vector<HeldOutModel> models;  ///< Empty for fewer than six photos.
   std::optional<ShapeTransfer>
-      transfer;  ///< Of the shape in use, else of the one that predicts best; none for too few photos.
+      transfer;  ///< Test of the shape in use, else of the one that predicts best; none for too few photos.
   /// How the print departs from its grid, where this is significant and would move the lens by more than two of its σ;
   /// empty otherwise. With every point free it is estimated.
   std::string print_error;

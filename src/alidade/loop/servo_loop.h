@@ -57,7 +57,7 @@ struct ServoScene {
   double sigma_encoder_rad = 0.0008726646259971648;
   double encoder_step_rad = 0.0;
   std::vector<std::pair<double, double>> hidden_s;  ///< Intervals (from, to) in which no head sees the target.
-  ZoomProfile zoom;                                 ///< Of all lenses.
+  ZoomProfile zoom;                                 ///< Zoom of all lenses over time.
   LensKnowledge intrinsics = LensKnowledge::given;
   std::size_t background_points = 24;  ///< Static points in view of the heads, for the observer.
 };
@@ -77,7 +77,7 @@ struct ServoRow {
   bool is_in_image = false;
   std::optional<Eigen::Vector2d> seen_px;  ///< Noisy pixel of the target, if the head saw it.
   ServoEvent event = ServoEvent::none;
-  IntrinsicsSample lens;  ///< That the controller uses for this image: estimated, or the rig's.
+  IntrinsicsSample lens;  ///< Intrinsics that the controller uses for this image: estimated, or the rig's.
   Eigen::Vector4d true_lens = Eigen::Vector4d::Zero();  ///< fx, fy, cx, cy. [px]
 };
 

@@ -40,9 +40,9 @@ struct RangefinderConfig {
   std::optional<double> sigma_range_per_m = {}, sigma_incidence_m = {};  ///< Terms that RangeNoise adds to it.
   std::optional<double> sigma_corner_px = {};  ///< Given: replaces the corners' own covariances.
   /// σ of given lengths, propagated to the covariance of the beam. 0: exact. None: unknown.
-  std::optional<double> sigma_square_m = {};  ///< Side of the board's squares.
-  std::optional<double> sigma_flat_m = {};    ///< Offset of the surface hit by the beam from the corners' plane.
-  std::optional<double> sigma_scale = {};     ///< Scale of the readings, where it is not estimated.
+  std::optional<double> sigma_square_m = {};  ///< σ of the side of the board's squares.
+  std::optional<double> sigma_flat_m = {};  ///< σ of the offset of the surface hit by the beam from the corners' plane.
+  std::optional<double> sigma_scale = {};   ///< σ of the scale of the readings, where it is not estimated.
   bool reject_outliers = true;
   double outlier_sigmas = 6.0;
   int num_draws = 100;  ///< Of the outlier search; with 3 outliers in 18, a sample of five is clean once in 3 draws.

@@ -18,7 +18,7 @@ struct ShotFit {
   bool used = false;
   std::string reason;                                                  ///< Why it was not used; empty otherwise.
   double residual_range_m = std::numeric_limits<double>::quiet_NaN();  ///< Predicted from the board − read.
-  double sigma_range_m = std::numeric_limits<double>::quiet_NaN();     ///< Of that residual: reading and board.
+  double sigma_range_m = std::numeric_limits<double>::quiet_NaN();     ///< σ of that residual, from reading and board.
   Eigen::Vector2d residual_px = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   Eigen::Matrix2d cov_px = Eigen::Matrix2d::Zero();        ///< Covariance of residual_px.
   Eigen::Vector3d point_in_cam = Eigen::Vector3d::Zero();  ///< Point that the beam predicts for the reading.

@@ -13,8 +13,8 @@ ALIDADE_PUBLIC_BEGIN
 
 /// Options of rig(). Plain data; the board must be given.
 struct RigConfig {
-  std::optional<double> sigma_px = {};           ///< Of a corner coordinate; none: estimated from the residuals.
-  std::optional<double> sigma_encoder_rad = {};  ///< Of a reading; none: estimated from the residuals.
+  std::optional<double> sigma_px = {};           ///< σ of a corner coordinate; none: estimated from the residuals.
+  std::optional<double> sigma_encoder_rad = {};  ///< σ of a reading; none: estimated from the residuals.
   std::optional<Board> board = {};               ///< It must not move while the heads observe it.
   bool estimate_scales = false;                  ///< Scale: axis angle per radian read.
   bool estimate_once = false;                    ///< Encoder error with one period per revolution, each axis.
@@ -24,8 +24,8 @@ struct RigConfig {
   /// Also estimates causes that the residuals indicate, if the views determine them, and scales that are not
   /// given.
   bool estimate_by_need = true;
-  std::optional<double> sigma_square_m = {};  ///< Side of the board's squares; none: unknown.
-  std::optional<double> sigma_scale = {};     ///< Scales of the encoders where they are fixed; none: unknown.
+  std::optional<double> sigma_square_m = {};  ///< σ of the side of the board's squares; none: unknown.
+  std::optional<double> sigma_scale = {};     ///< σ of the encoders' scales where they are fixed; none: unknown.
   /// σ of an encoder's error within a revolution, which changes its scale over part of the revolution: added to
   /// sigma_scale. 0: no such error.
   double sigma_within_turn_rad = 5e-4;

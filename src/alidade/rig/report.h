@@ -21,7 +21,7 @@ struct HeadViewFit {
   bool used = false;
   std::string reason;      ///< Why it was not used; empty otherwise.
   std::string misreading;  ///< Probable mistake in its row: "fits board 3"; empty: none of those tried fits.
-  double chi2 = 0.0;       ///< Of corners and reading, for the estimated rig; computed for rejected views too.
+  double chi2 = 0.0;       ///< χ² of corners and reading for the estimated rig; computed for rejected views too.
   double rms_px = 0.0;     ///< Per point.
   Eigen::Vector2d reading_correction_rad = Eigen::Vector2d::Zero();  ///< Estimated reading minus actual reading.
   std::vector<Eigen::Vector2d> residual_px;                          ///< Prediction − observation, one per corner.
@@ -132,7 +132,7 @@ struct RigReport {
   std::vector<std::string> unknown;  ///< Parameters in the unobservable combination.
   double sigma_px = 0.0, sigma_encoder_rad = 0.0;
   bool sigma_px_is_estimated = false, sigma_encoder_is_estimated = false;  ///< From the residuals.
-  double chi2 = 0.0;  ///< Of whitened corners and reading corrections.
+  double chi2 = 0.0;  ///< χ² of whitened corners and reading corrections.
   int dof = 0;
   double rms_px = 0.0;  ///< Per point, over the used views.
   /// σ of the pose of another head's camera in the first camera's frame (one head: of its camera after a rotation,

@@ -40,7 +40,7 @@ struct ServoConfig {
   PiGains pi;                       ///< For `pi`, and for the feedback part of `feedforward` on an angle plant.
   double rate_gain_per_s = 8.0;     ///< For `feedforward` on a rate plant: rate per angle of error.
   double command_weight = 2.0;      ///< For `lqr` and `mpc`: cost of effort relative to error.
-  double sigma_px = 0.5;            ///< Of one pixel coordinate of the target.
+  double sigma_px = 0.5;            ///< σ of one pixel coordinate of the target.
   double sigma_encoder_rad = 0.0008726646259971648;
   double range_m = 1.0;  ///< Rough range of the target: only matters if the axes of a head do not intersect.
   BearingFilterConfig filter;

@@ -123,7 +123,7 @@ struct ServoFit {
   /// Clusters are blocks of rows for the selected kind of plant; for the other kind, equal to `cov_model`.
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov = decltype(cov)::Zero();
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov_model = decltype(cov)::Zero();  ///< For white noise.
-  double rms_rad = 0.0;  ///< Of the residuals, over the degrees of freedom.
+  double rms_rad = 0.0;  ///< RMS of the residuals, over the degrees of freedom.
   bool has_converged = false;
   bool is_observable = false;  ///< The normal equations are regular.
 };

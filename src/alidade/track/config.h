@@ -22,9 +22,9 @@ struct TrackConfig {
   bool corrected = false;                            ///< xiahou2015: corrected pixels and mounting; false: as printed.
   std::optional<double> predict_s = {};              ///< Also predict this far ahead of each observation.
   std::optional<double> smooth_s = {};      ///< Also smooth, with the observations up to this much later; not for imm.
-  std::optional<double> sigma_a_m_s2 = {};  ///< Acceleration of the target. None: estimated from the innovations.
+  std::optional<double> sigma_a_m_s2 = {};  ///< σ of the target's acceleration. None: estimated from the innovations.
   std::optional<double> sigma_px = {};      ///< Of a pixel coordinate. None: 0.5, unless the innovations contradict it.
-  std::optional<double> sigma_clock_s = {};        ///< Offset between a head's clock and its images. None: exact.
+  std::optional<double> sigma_clock_s = {};  ///< σ of the offset between a head's clock and its images. None: exact.
   double sigma_angle_rad = 0.0008726646259971648;  ///< 0.05°; for heads whose encoders have no σ of their own.
   double min_depth_m = 0.2, max_depth_m = 20.0;    ///< Working range of the rig, along a camera's optical axis.
   int keep_rows = 100000;  ///< Number of observations that a TargetTracker keeps: at least this many, at most twice.

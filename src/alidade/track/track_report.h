@@ -54,7 +54,7 @@ struct RigPower {
   std::size_t head = 0;   ///< Index in the rig's list of heads.
   Eigen::VectorXd step;   ///< Change of the head's rows in RigUncertainty for one unit of the parameter.
   double largest = 0.0;   ///< Assumed upper bound of its error.
-  double z_per_unit = 0;  ///< By how much an error of one unit raises z; 0: such an error is unobservable.
+  double z_per_unit = 0;  ///< Increase of z per unit of error; 0: unobservable.
 };
 
 /// Random errors of the capture times.
@@ -91,7 +91,7 @@ struct TrackReport {
   std::vector<PredictedStep> ahead;     ///< One per step, or none.
   std::vector<PredictedStep> smoothed;  ///< In chronological order, one per capture time that can be smoothed; or none.
   std::size_t num_used = 0, num_starts = 0, num_restarts = 0;
-  double log_likelihood = 0.0;  ///< Of all innovations, up to a constant.
+  double log_likelihood = 0.0;  ///< Log-likelihood of all innovations, up to a constant.
   /// Compared with the true path after the warm-up; NaN without truth.
   double rms_m = std::numeric_limits<double>::quiet_NaN();
   double mean_error_m = std::numeric_limits<double>::quiet_NaN();

@@ -11,21 +11,21 @@
 #include "alidade/pantilt/rotation_log.h"
 #include "alidade/public.h"
 
-/// Intrinsics of a camera that rotates (and zooms), from what it sees meanwhile: the whole job, as `alidade observe`
-/// does it. Incremental, row by row: Observer. Where to rotate next: plan_moves().
+/// Intrinsics of a camera that rotates (and zooms), from its images meanwhile: everything that `alidade observe` does.
+/// Observer is the incremental variant, row by row; plan_moves() says where to rotate next.
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// From a log of its rotation and of static points. Throws ConfigError for an invalid config or log, Interrupted where
-/// `progress` returns false; never for what the log shows. docs/maths/rotating-camera.md.
+/// From a log of the camera's rotation and of static points. Throws ConfigError for an invalid config or log,
+/// Interrupted if `progress` returns false, but never because of what the log shows. docs/maths/rotating-camera.md.
 [[nodiscard]] ObserveReport observe(RotationLog log, const ObserveConfig& config = {}, const Progress& progress = {});
 
-/// From photos taken while it was rotated about its centre, by hand for example. Of the config method, lever, σ of
-/// angles, rates and ranges, and window do not apply; `estimate` is auto, none, k1 or k2. docs/maths/turned-photos.md.
+/// From photos taken while the camera rotated about its centre, by hand for example. Method, lever, window, and σ of
+/// angles, rates and ranges do not apply; `estimate` is auto, none, k1 or k2. docs/maths/turned-photos.md.
 [[nodiscard]] ObserveReport observe(const Photos& photos, const ObserveConfig& config = {},
                                     const Progress& progress = {});
 
-/// From given matches between such photos, of which many may be wrong.
+/// From given matches between such photos; many of them may be wrong.
 [[nodiscard]] ObserveReport observe(MatchedPhotos matches, const ObserveConfig& config = {},
                                     const Progress& progress = {});
 

@@ -15,7 +15,7 @@ struct Belief {
   Eigen::Matrix<double, N, N> P = Eigen::Matrix<double, N, N>::Identity();
 };
 
-/// Copies the upper triangle onto the lower one. Write recursions so that the upper one is right.
+/// Copies the upper triangle to the lower one. Recursions need to compute only the upper triangle correctly.
 template <int N>
 void mirror_upper(Eigen::Matrix<double, N, N>& P) {
   for (int i = 1; i < N; ++i) {

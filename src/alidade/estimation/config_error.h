@@ -9,14 +9,14 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// An invalid config, or invalid values: a misspelt model, a corner that the board does not have. Thrown before any
-/// work by the jobs of the public headers, with every fault in one sentence. The command line ends in exit code 2 with
-/// it.
+/// An invalid config, or invalid values: a misspelt model, a corner that the board does not have. The functions of the
+/// public headers throw it before any work, with every fault in one sentence. The command line then ends with exit code
+/// 2.
 struct ConfigError : std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// Throws it with all these faults, if there are any.
+/// Throws a ConfigError that lists all these faults, if there are any.
 inline void require_none(const std::vector<std::string>& faults) {
   std::string sentence;
   for (const std::string& each : faults) sentence += (sentence.empty() ? "" : "; ") + each;

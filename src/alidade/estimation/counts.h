@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A file that a result was made from.
+/// An input file of a result.
 struct InputFile {
   std::string role;  ///< photo, camera, log, …
   std::string name;  ///< As given.
@@ -17,14 +17,14 @@ struct InputFile {
   std::string sha256;
 };
 
-/// A row, or a photo, that was rejected, and why. Line 0: the whole file.
+/// A rejected row or photo, and the reason. Line 0: the whole file.
 struct SkippedInput {
   std::string file;
   std::size_t line = 0;
   std::string reason;
 };
 
-/// How much was given and what became of it; photos in calibrate, rows or frames elsewhere.
+/// How much was given, and what became of it: photos in calibrate, rows or frames elsewhere.
 struct Counts {
   std::size_t given = 0;
   std::size_t used = 0;
@@ -32,7 +32,7 @@ struct Counts {
   std::vector<SkippedInput> skipped;
 };
 
-/// Rows that were rejected in reading count as given; they stand before what the job itself rejected.
+/// Counts rows that were rejected in reading as given, and lists them before those that the job itself rejected.
 inline void add_skipped(const std::vector<SkippedInput>& rows, Counts& counts) {
   counts.given += rows.size();
   counts.skipped.insert(counts.skipped.begin(), rows.begin(), rows.end());

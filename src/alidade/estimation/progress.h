@@ -11,15 +11,15 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The user pressed Ctrl-C; the command line turns it into one line and its exit code, nothing is written.
+/// Thrown after the user pressed Ctrl-C. The command line turns it into one line and an exit code; nothing is written.
 struct Interrupted : std::runtime_error {
   Interrupted() : std::runtime_error("interrupted; nothing written") {}
-  /// For work that keeps what it has done.
+  /// For work that keeps what it has finished.
   explicit Interrupted(const std::string& what) : std::runtime_error(what) {}
 };
 
-/// How long-running work reports progress and is stopped: called now and then, from any thread, as (what, done, total).
-/// Returns false to stop; the work then throws Interrupted. An empty Progress never stops and shows nothing.
+/// Reports the progress of long-running work and can stop it: called now and then, from any thread, as (what, done,
+/// total). If it returns false the work throws Interrupted. An empty Progress never stops the work and reports nothing.
 using Progress = std::function<bool(std::string_view what, std::size_t done, std::size_t total)>;
 
 inline void report_progress(const Progress& progress, std::string_view what, std::size_t done, std::size_t total) {

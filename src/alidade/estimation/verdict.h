@@ -16,39 +16,39 @@ enum class ExitCode : int {
   usage = 2,
   bad_input = 3,
   undetermined = 4,
-  cannot_tell [[deprecated("undetermined")]] = undetermined,  ///< Its former name, for one release.
+  cannot_tell [[deprecated("undetermined")]] = undetermined,  ///< The former name, for one release.
   no_convergence = 5,
-  not_trusted = 6  ///< There is an estimate, and its files, but its own checks speak against it (State::bad).
+  not_trusted = 6  ///< There is an estimate, with its files, but its own checks contradict it (State::bad).
 };
 
-/// State of an answer, or of one check of it. Shown as ● ◆ ▲ ■ ✕.
+/// State of an answer, or of one of its checks. Shown as ● ◆ ▲ ■ ✕.
 enum class State { good, care, bad, refused, not_converged };
 
-/// One thing that was checked: "coverage: worst 3σ 0.5 px, bottom-left corner".
+/// The result of one check: "coverage: worst 3σ 0.5 px, bottom-left corner".
 struct Check {
   std::string name = {};
   State state = State::good;
   std::string text = {};
-  double value = 0.0;  ///< The figure that decides, in `unit`.
-  double limit = 0.0;  ///< Beyond it the state changes.
+  double value = 0.0;  ///< The figure that decides the state, in `unit`.
+  double limit = 0.0;  ///< The state changes beyond it.
   std::string unit = {};
-  std::string figure = {};  ///< Id of the figure in the report that shows it.
+  std::string figure = {};  ///< Id of the figure in the report that shows the value.
 };
 
-/// An assumption: a camera file, the length of a square, a σ given by the user. Its effect on the
-/// answer if it were off by its σ or, where none is given, by a typical error.
+/// An assumption: a camera file, the length of a square, a σ given by the user; and its effect on the answer if it were
+/// off by its σ or, if none is given, by a typical error.
 struct Assumption {
   std::string name = {};        ///< "square_m", "camera.fx"
-  double value = 0.0;           ///< NaN where it is not a number.
+  double value = 0.0;           ///< NaN if it is not a number.
   std::optional<double> sigma;  ///< Given with it and included in the answer's σ; 0: exact. None: not known.
-  double ordinary = 0.0;        ///< Where there is no σ: the error supposed, in the value's unit.
-  double moves = 0.0;           ///< Largest move of a result for that error, in that result's stated σ.
-  std::string moved = {};       ///< Which result that is: "fx", "origin_m z".
-  double moved_by = 0.0;        ///< By how much, in its unit.
-  std::string remedy = {};      ///< What a user can do to have it included: "give --sigma-square".
+  double ordinary = 0.0;        ///< If there is no σ: the assumed typical error, in the value's unit.
+  double moves = 0.0;           ///< Largest change of a result by that error, in that result's stated σ.
+  std::string moved = {};       ///< Name of that result: "fx", "origin_m z".
+  double moved_by = 0.0;        ///< Its change, in its unit.
+  std::string remedy = {};      ///< What a user can do to have the error included: "give --sigma-square".
 };
 
-/// The assessment of an estimate by its estimator: a state, one sentence, what to add, and the checks behind it.
+/// An estimator's assessment of its estimate: a state, one sentence, what to add, and the checks behind it.
 struct Verdict {
   State state = State::good;
   ExitCode exit_code = ExitCode::ok;
@@ -56,25 +56,25 @@ struct Verdict {
   std::string to_add;  ///< What the user should do next; empty if nothing.
   std::vector<Check> checks;
 
-  /// Whether there is a usable answer: good, or with care.
+  /// Whether there is a usable answer: good, or to be used with care.
   [[nodiscard]] bool ok() const { return state == State::good || state == State::care; }
 };
 
-/// The check "assumed": an answer is good only where nothing assumed without a σ moves it by more than its own σ. With
-/// nothing assumed it is good.
+/// The check "assumed": an answer is good only if nothing that is assumed without a σ moves it by more than its own σ.
+/// It is also good if nothing is assumed.
 [[nodiscard]] Check assumed_check(const std::vector<Assumption>& assumed);
 
-/// Adds the check to the verdict. A good verdict becomes State::care if the check is not good, and says what to do.
+/// Adds the check to the verdict. If it is not good, a good verdict becomes State::care, with `remedy` as advice.
 void heed(const Check& check, const std::string& remedy, Verdict& verdict);
 
-/// Both of the above.
+/// assumed_check(), then heed().
 void heed_assumptions(const std::vector<Assumption>& assumed, Verdict& verdict);
 
-/// A plan whose steps lower nothing that matters by a hundredth becomes State::care. `ratio`: the least of what is
-/// known after them over the same now.
+/// A plan becomes State::care if its steps reduce no σ of interest by at least 1 %. `ratio` is the smallest ratio of
+/// such a σ after the steps to its present value.
 void heed_gain(double ratio, const std::string& remedy, Verdict& verdict);
 
-/// The value with so many significant digits, as sentences and checks quote it.
+/// The value with `digits` significant digits, as sentences and checks quote it.
 [[nodiscard]] std::string text_of(double value, int digits = 3);
 
 ALIDADE_PUBLIC_END

@@ -6,15 +6,15 @@
 
 namespace alidade {
 
-/// How far the beam's line passes from the camera's centre.
+/// Distance of the beam's line from the camera centre.
 struct LineOffset {
   double value_m = 0.0, sigma_m = 0.0;
 };
 
-/// Of the solved beam; where that does not know it, of the spots.
+/// From the estimated beam; if that does not determine it, from the spots.
 [[nodiscard]] LineOffset line_offset(const RangefinderReport& report, std::span<const Shot> shots);
 
-/// Only where the shots do say so: a line that passes far off, however badly known, is another matter.
+/// Only if the shots determine it: a line far from the centre that is poorly known is another matter.
 [[nodiscard]] bool passes_the_centre(const LineOffset& offset);
 
 }  // namespace alidade

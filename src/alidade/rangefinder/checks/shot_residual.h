@@ -8,56 +8,56 @@
 
 namespace alidade {
 
-/// A shot made ready for the solver: every σ known, the board's plane known, and only what the method uses.
+/// A shot prepared for the solver: every σ and the plane of the board known, and only the data that the method uses.
 struct PreparedShot {
   std::size_t index = 0;  ///< In the caller's list.
   double range_m = 0.0;
-  std::optional<double> sigma_range_m;  ///< Of this reading alone; else the common noise.
+  std::optional<double> sigma_range_m;  ///< For this reading only; none: the common noise.
   std::optional<Eigen::Vector2d> spot_px;
   std::optional<Eigen::Vector3d> spot_ray;  ///< Unit ray of the spot, in the camera frame.
   double sigma_spot_px = 1.0;
-  bool owns_spot_sigma = false;      ///< The shot brought its σ.
-  double min_sigma_spot_px = 0.0;    ///< What its finder knows of.
-  std::optional<Plane> plane;        ///< The board's; is compared with the reading.
-  std::optional<BoardPose> pose;     ///< Where the plane comes from a board; else the plane's own covariance counts.
-  const BoardView* board = nullptr;  ///< Its corners, where it has them.
-  double corner_factor = 1.0;  ///< On the corners' σ, as this board's fit shows: a near one shows that it is curved.
-  Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_lens;  ///< How the pose follows the lens; empty where it does not.
-  bool used = true;  ///< Of the laser: false for an outlier (its corners still determine the lens).
+  bool owns_spot_sigma = false;    ///< The shot has a σ of its own.
+  double min_sigma_spot_px = 0.0;  ///< Lower bound of σ from its detector.
+  std::optional<Plane> plane;      ///< Plane of the board; compared with the reading.
+  std::optional<BoardPose> pose;   ///< If the plane comes from a board pose; else the covariance of the plane applies.
+  const BoardView* board = nullptr;  ///< Its corners, if it has them.
+  double corner_factor = 1.0;  ///< Factor on the corners' σ, from the board's fit: a close board shows its curvature.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_lens;  ///< ∂ pose / ∂ lens; empty if it does not depend on it.
+  bool used = true;  ///< For the beam: false for an outlier (its corners still determine the lens).
 
   [[nodiscard]] int num_rows() const { return (plane ? 1 : 0) + (spot_px ? 2 : 0); }
 };
 
-/// What the residuals of a shot depend on beside the shot: the reading counted once or twice, and the common noise.
+/// What the residuals depend on besides the shot: the reading counted once or twice, and the common noise.
 struct ShotModel {
   RangeNoise noise;
   bool reading_counts_twice = false;
 };
 
-/// Residuals (prediction − observation) of one shot: the reading [m] where there is a plane, then the spot [px] where
-/// there is one; with their derivatives and the covariance of what they were measured with. With a plane, the spot is
-/// predicted where the beam meets it, so that each measurement is in one residual; without, at the reading, whose error
-/// then moves the spot along the beam's image.
+/// Residuals (prediction − observation) of one shot: the reading [m] if there is a plane, then the spot [px] if there
+/// is one; with their derivatives and the covariance of the measurements. With a plane, the spot is predicted at the
+/// intersection of beam and plane, so that each measurement is in one residual; without one, at the reading, whose
+/// error then moves the spot along the image of the beam.
 struct ShotResidual {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
   Rows r;
   Eigen::Matrix<double, Eigen::Dynamic, num_beam_params, 0, 3, num_beam_params> J_beam;
-  Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 3, 6> J_pose;   ///< By ξ of the pose; zero without a pose.
-  Eigen::Matrix<double, Eigen::Dynamic, 4, 0, 3, 4> J_plane;  ///< By (normal, d) of the plane.
+  Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 3, 6> J_pose;   ///< With respect to ξ of the pose; zero without a pose.
+  Eigen::Matrix<double, Eigen::Dynamic, 4, 0, 3, 4> J_plane;  ///< With respect to (normal, d) of the plane.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 16> J_lens;
-  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 3, 3> J_errors;  ///< By an error of the reading [m], of the spot [px].
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> noise_cov;  ///< Without the plane's.
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 3, 3> J_errors;                ///< Of reading [m] and spot [px].
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> noise_cov;  ///< Without that of the plane.
 };
 
-/// None where the beam does not meet the plane ahead, or the lens does not see the spot: a step to there is refused.
+/// None if the beam does not intersect the plane in front, or the lens does not see the spot: such a step is rejected.
 [[nodiscard]] std::optional<ShotResidual> shot_residual(const PreparedShot& shot, const Beam& beam,
                                                         const Camera& camera, const ShotModel& model);
 
-/// Its covariance with that of the plane (pose) carried into it.
+/// Covariance of the residuals including that of the plane (pose).
 [[nodiscard]] Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> full_covariance(
     const PreparedShot& shot, const ShotResidual& residual);
 
-/// Lower-triangular L⁻¹ of cov = L Lᵀ: makes residuals white.
+/// Lower-triangular L⁻¹ of cov = L Lᵀ: whitens residuals.
 [[nodiscard]] Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> whitener_of(
     const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>& cov);
 

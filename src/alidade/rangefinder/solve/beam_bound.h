@@ -5,12 +5,12 @@
 
 namespace alidade {
 
-/// Geometry and uncertainty of a beam that has its covariance: everything of BeamBound but `cov`.
+/// Geometry and uncertainty of a beam with known covariance: all members of BeamBound except `cov`.
 [[nodiscard]] BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera& camera);
 
-/// Ratio of the largest to the least eigenvalue after scaling to a unit diagonal; infinite where it is singular.
+/// Ratio of the largest to the smallest eigenvalue after scaling to a unit diagonal; infinite if singular.
 [[nodiscard]] double scaled_condition(const Eigen::MatrixXd& information);
-/// The inverse of an information whose diagonal spans many powers of ten.
+/// Inverse of an information matrix whose diagonal spans many orders of magnitude.
 [[nodiscard]] Eigen::MatrixXd inverse_of_scaled(const Eigen::MatrixXd& information);
 
 }  // namespace alidade

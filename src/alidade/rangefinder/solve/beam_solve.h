@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Everything that a solve for the beam needs beside where to start.
+/// All inputs of a solve for the beam except the initial guess.
 struct BeamProblem {
   std::vector<PreparedShot> shots;
   std::span<const Eigen::Vector3d> points_in_board;
@@ -16,15 +16,15 @@ struct BeamProblem {
   bool estimate_scale = false;
   int max_iterations = 50;
 
-  /// Free parameters of the beam: the first so many of the six.
+  /// Number of free parameters of the beam: the first ones of the six.
   [[nodiscard]] int num_free() const { return estimate_scale ? 6 : 5; }
 };
 
-/// Normal equations of the laser's residuals, each whitened with its full covariance; poses and lens fixed.
+/// Normal equations of the laser's residuals, each whitened with its full covariance; poses and lens are fixed.
 struct BeamNormals {
   BeamMatrix H = BeamMatrix::Zero();
   BeamVector g = BeamVector::Zero();
-  /// Jᵀ W J_lens, poses following the lens; of beam_normals() alone, not of a solution.
+  /// Jᵀ W J_lens, poses following the lens; from beam_normals() only, not from a solution.
   Eigen::Matrix<double, num_beam_params, Eigen::Dynamic> H_lens;
   double cost = 0.0;
   int num_rows = 0;
@@ -39,12 +39,12 @@ struct BeamSolution {
   int iterations = 0;
 };
 
-/// Levenberg–Marquardt on the sphere of directions from `start`, weights renewed at each step. None where the start has
-/// no residuals.
+/// Levenberg–Marquardt on the sphere of directions from `start`, with the weights updated at each step. None if the
+/// initial guess has no residuals.
 [[nodiscard]] std::optional<BeamSolution> solve_beam(const BeamProblem& problem, const Camera& camera,
                                                      const Beam& start);
 
-/// Squared whitened residual of one shot; infinite where it has none.
+/// Squared whitened residual of one shot; infinite if it has none.
 [[nodiscard]] double shot_chi2(const PreparedShot& shot, const Beam& beam, const Camera& camera,
                                const ShotModel& model);
 

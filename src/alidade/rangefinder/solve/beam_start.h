@@ -8,17 +8,17 @@
 
 namespace alidade {
 
-/// Beam through the spots' rays at their readings: null vector of  −L A + ray-direction …, two rows a spot, scaled,
+/// Beam from the spots' rays and readings: null vector of −L A + ray-direction …, two rows per spot, scaled,
 /// then |A| = 1 and the spots in front of the camera. At least three spots. Wang & Li 2020, eq. (5)–(6).
 [[nodiscard]] std::optional<Beam> spot_start(std::span<const PreparedShot* const> shots);
 
-/// Beams that fit the planes best, min Σ (nᵢ·B + Lᵢ nᵢ·A + dᵢ)² with |A| = 1: every stationary point of it that lies in
-/// front of the camera, best first; with five planes the two that fit exactly. Wang & Li 2020, eq. (12), whose solution
-/// by unconstrained least squares needs six planes and is worse.
+/// Beams that fit the planes best, min Σ (nᵢ·B + Lᵢ nᵢ·A + dᵢ)² with |A| = 1: every stationary point in front of the
+/// camera, best first; with five planes the two exact fits. The solution of Wang & Li 2020, eq. (12), by unconstrained
+/// least squares needs six planes and is less accurate.
 [[nodiscard]] std::vector<Beam> plane_starts(std::span<const PreparedShot* const> shots);
 
-/// The same equations together, each divided by its σ, without |A| = 1 until the end: linear from two shots that have
-/// both. `focal_px`: of the lens, for the weight of a spot. With a scale to estimate, |A| is that scale.
+/// Both kinds of equations together, each divided by its σ, with |A| = 1 imposed only at the end: linear from two shots
+/// that have both. `focal_px`: of the lens, for the weight of a spot. With a scale to estimate, |A| is that scale.
 [[nodiscard]] std::optional<Beam> joint_start(std::span<const PreparedShot* const> shots, const ShotModel& model,
                                               double focal_px, bool estimate_scale);
 

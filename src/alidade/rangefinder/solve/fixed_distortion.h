@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// The parameters of radial and tangential distortion that `free` does not have, of a lens that has any.
+/// The parameters of radial and tangential distortion that are not in `free`, for a lens that has any.
 [[nodiscard]] std::vector<int> fixed_distortion(const Camera& camera, const std::vector<int>& free);
 
 /// The lens with a wide prior on the distortion that its file gives without σ, so that the shots can estimate it.

@@ -5,17 +5,17 @@
 
 namespace alidade {
 
-/// What a solve fixed and took as given. `places`: indices of its parameters in the system; `inverse`: of their
+/// Quantities that a solve fixed. `places`: indices of its parameters in the system; `inverse`: of their
 /// information.
 struct SolvedPart {
   std::vector<Eigen::Index> places;
   Eigen::MatrixXd inverse;
 };
 
-/// ∂cost/2 by all parameters of the system, with what the lens' prior pulls; `camera`: as it stands.
+/// ∂cost/2 with respect to all parameters of the system, including the lens prior; `camera`: the current one.
 [[nodiscard]] Eigen::VectorXd gradient_of(const ReducedSystem& system, const LensPrior& prior, const Camera& camera);
 
-/// Square and scale, focal length, centre and fixed distortion, flatness of the board: by how much each moves the beam,
+/// Square and scale, focal length, centre and fixed distortion, flatness of the board: effect of each on the beam,
 /// and its score test. `camera`: as given. C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948 (the score test).
 [[nodiscard]] std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const SolvedPart& part,
                                                           const LensPrior& prior, const Camera& camera,
@@ -23,7 +23,7 @@ struct SolvedPart {
                                                           const RangefinderReport& report,
                                                           const RangefinderConfig& config);
 
-/// The σ of readings and spots: what the beam does where they are another, lens and poses fixed.
+/// The same for the σ of readings and spots: effect on the beam of another value, lens and poses fixed.
 [[nodiscard]] std::vector<FixedQuantity> fixed_sigmas(const BeamProblem& problem, const RangefinderReport& report);
 
 }  // namespace alidade

@@ -8,25 +8,25 @@
 
 namespace alidade {
 
-/// What is known of a beam and its lens, and what rangefinder() states of the beam with more shots: the lens free with
-/// it (Refine::all) or fixed and its covariance carried (Refine::beam), and distortion that the camera file gives
-/// without σ held, or estimated too once wants_distortion() says so; of a sheet before the print what the shots leave
-/// open. Keeps references to what it is made from.
+/// Predicts the covariance that rangefinder() would state with more shots. The lens is estimated too (Refine::all), or
+/// fixed with its covariance propagated (Refine::beam); distortion without σ in the camera file is fixed, or estimated
+/// too once wants_distortion() says so; a sheet in front of the print keeps the uncertainty that the shots leave.
+/// Keeps references to its arguments.
 class ForeseenBeam {
  public:
   explicit ForeseenBeam(const BeamNow& now);
 
-  /// The board there; none where the camera does not see it whole, 5 px inside the image.
+  /// The board at that pose; none if the camera does not see all of it, 5 px inside the image.
   [[nodiscard]] std::optional<BoardView> board_at(const Rigid3& cam_from_board) const;
 
-  /// Of a shot measured exactly as predicted, of what the given shots show; none where the lens does not see it.
+  /// Information of a shot like the given ones, measured exactly as predicted; none if the lens does not see it.
   [[nodiscard]] std::optional<Eigen::MatrixXd> information_of(double range_m, const Rigid3& cam_from_board,
                                                               const BoardView& board, bool has_spot) const;
 
-  /// Covariance of the beam's free parameters with a shot's information. NaN where it is singular.
+  /// Covariance of the beam's free parameters including a shot's information. NaN if singular.
   [[nodiscard]] Eigen::MatrixXd cov_with(const Eigen::MatrixXd& added) const;
 
-  /// What follows counts the shot.
+  /// From now on the shot is included.
   void add(const Eigen::MatrixXd& added);
   [[nodiscard]] BeamBound bound() const;
 
@@ -39,12 +39,12 @@ class ForeseenBeam {
   void put_sheet();
 
   const BeamNow& now_;
-  Camera camera_;  ///< Of a model that has distortion.
+  Camera camera_;  ///< With a model that has distortion.
   BeamProblem problem_;
-  LensPrior prior_;              ///< Free: what has a σ, then `held_`. Without information: that is in what is known.
-  std::vector<int> held_;        ///< Distortion without σ, that may be estimated too.
-  Eigen::Index num_ = 0;         ///< Of the beam's and the lens' parameters but `held_`.
-  Eigen::MatrixXd information_;  ///< Of the beam, what has a σ, and `held_` and a sheet (these without a prior).
+  LensPrior prior_;              ///< Free: what has a σ, then `held_`. No information: it is in information_.
+  std::vector<int> held_;        ///< Distortion without σ that may be estimated too.
+  Eigen::Index num_ = 0;         ///< Number of parameters of beam and lens without `held_`.
+  Eigen::MatrixXd information_;  ///< Of the beam, what has a σ, `held_` and a sheet (the latter two without prior).
   bool frees_distortion_ = false;
 };
 

@@ -4,14 +4,14 @@
 
 namespace alidade {
 
-/// What may move of the lens, and how far: the parameters that its covariance leaves free, with the information that
-/// this covariance is about them.
+/// The free parameters of the lens and their prior: those that its covariance leaves free, with the corresponding
+/// information.
 struct LensPrior {
   std::vector<int> free;
-  Eigen::VectorXd mean;         ///< Of all parameters.
-  Eigen::MatrixXd information;  ///< Of the free ones; where the covariance is singular, 10¹⁰ times the rest.
+  Eigen::VectorXd mean;         ///< Over all parameters.
+  Eigen::MatrixXd information;  ///< Over the free ones; in singular directions, 10¹⁰ times the rest.
 };
-/// Nothing is free where the covariance is not known. `with_distortion` false: at most fx, fy, cx, cy.
+/// No parameter is free if the covariance is unknown. `with_distortion` false: at most fx, fy, cx, cy.
 [[nodiscard]] LensPrior lens_prior(const Camera& camera, bool with_distortion);
 
 /// Normal equations over [beam (5 or 6), free lens parameters] and the pose of each board that has corners. Residuals:
@@ -21,7 +21,7 @@ struct CommonSystem {
   struct ShotBlock {
     bool has_pose = false;
     Eigen::Matrix<double, 6, 6> V = Eigen::Matrix<double, 6, 6>::Zero();
-    Eigen::Matrix<double, 6, Eigen::Dynamic> W;  ///< Pose by common.
+    Eigen::Matrix<double, 6, Eigen::Dynamic> W;  ///< Pose × shared parameters.
     Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
     Whitener whitener;
   };
@@ -36,31 +36,31 @@ struct CommonSystem {
   [[nodiscard]] Eigen::MatrixXd information() const;
 };
 
-/// Where the solve stands. Shots without corners have no pose here.
+/// State of the solve. Shots without corners have no pose here.
 struct CommonState {
   Beam beam;
   Camera camera;
   std::vector<std::optional<Rigid3>> cam_from_board;
 };
 
-/// The shot with its plane where the board now is; the pose is a parameter, not a measurement. None: as it is.
+/// The shot with its plane at the current board pose, which is a parameter, not a measurement. None: unchanged.
 [[nodiscard]] PreparedShot at_state(const PreparedShot& shot, const std::optional<Rigid3>& cam_from_board);
 
-/// None where a corner or spot is not seen or a plane not met. `old`: whiteners for cost_with_old_weights.
+/// None if a corner or spot is not visible or a plane not intersected. `old`: whiteners for cost_with_old_weights.
 [[nodiscard]] std::optional<CommonSystem> common_system(const BeamProblem& problem, const LensPrior& prior,
                                                         const CommonState& state, const CommonSystem* old = nullptr);
 
 struct RefinedBeam {
   CommonState state;    ///< Beam and camera with covariance.
-  CommonSystem system;  ///< At the state.
+  CommonSystem system;  ///< At `state`.
   std::vector<std::optional<BoardPose>> poses;
   int num_parameters = 0;
   bool converged = false;
   int iterations = 0;
 };
 
-/// Levenberg–Marquardt over everything, poses eliminated. None where the start has no residuals or the information is
-/// singular. `max_iterations` 0: covariances at the start.
+/// Levenberg–Marquardt over all parameters, poses eliminated. None if the initial guess has no residuals or the
+/// information is singular. `max_iterations` 0: covariances at the initial guess.
 [[nodiscard]] std::optional<RefinedBeam> refine_all(const BeamProblem& problem, const LensPrior& prior,
                                                     const CommonState& start, int max_iterations);
 

@@ -8,13 +8,13 @@
 namespace alidade {
 namespace {
 
-constexpr double min_rho = 1e-4;  // 10 km: beyond it only the direction can be determined
+constexpr double min_rho = 1e-4;  // 10 km: beyond it only the direction is observable
 
-/// The point at a distance that is seen at a pixel. A lens with a port has no single centre: its ray is a start only.
+/// The point on a pixel's ray at a given distance. A flat port has no single centre: its ray is a first guess only.
 struct PointOnRay {
   Eigen::Vector3d ray_in_cam;
   Eigen::Matrix<double, 3, 2> B;
-  Eigen::Matrix2d J_px_turn;  ///< By a rotation of the ray along B.
+  Eigen::Matrix2d J_px_turn;  ///< W.r.t. a rotation of the ray along B.
   LensProjection seen;
 };
 
@@ -22,7 +22,7 @@ std::optional<PointOnRay> point_on_ray(const Camera& camera, const Eigen::Vector
   const auto start = unproject(camera, px);
   if (!start) return std::nullopt;
   Eigen::Vector3d ray = *start;
-  constexpr int max_iterations = 10;  // one is enough for a lens with a centre
+  constexpr int max_iterations = 10;  // one is enough for a central camera
   for (int i = 0; i < max_iterations; ++i) {
     const auto seen = project_with_jacobians(camera, range_m * ray);
     if (!seen) return std::nullopt;
@@ -99,7 +99,7 @@ std::optional<NewFeature> new_feature(const Camera& camera, const Rigid3& world_
   const Eigen::Matrix3d R = world_from_cam.rotation.toRotationMatrix();
   const Eigen::Matrix2d J_turn_px = at->J_px_turn.inverse();
   const Eigen::Matrix<double, 3, 2> J_ray_px = R * at->B * J_turn_px;
-  // By the distance; along the ray of a lens with one centre nothing rotates.
+  // W.r.t. the distance; zero for a central camera, whose ray does not depend on it.
   const Eigen::Vector3d J_ray_range = -J_ray_px * (at->seen.J_px_point * at->ray_in_cam);
   const Eigen::Vector3d ray_in_world = R * at->ray_in_cam;
   const Eigen::Matrix3d J_ray_rotation = -R * cross_matrix(at->ray_in_cam);

@@ -56,7 +56,7 @@ void LocalizationFilter::predict(double dt_s) {
   motion_ = moved(motion_, dt_s);
   given_.predict(J.F);
   for (int j = motion_dim; j < P_.dim(); ++j) {
-    Eigen::Map<Eigen::Vector<double, motion_dim>> column(&P_.at(0, j));  // F changes position and rotation
+    Eigen::Map<Eigen::Vector<double, motion_dim>> column(&P_.at(0, j));  // F changes position and rotation only
     const Eigen::Vector3d rotation = column.segment<3>(3), rate = column.tail<3>();
     column.head<3>() += dt_s * column.segment<3>(6);
     column.segment<3>(3) = J.F.block<3, 3>(3, 3) * rotation + J.F.block<3, 3>(3, 9) * rate;
@@ -89,14 +89,14 @@ bool LocalizationFilter::add(long id, const Eigen::Vector2d& px, const RangePrio
   const double sigma_px = config_.sigma_new_px > 0.0 ? config_.sigma_new_px : config_.sigma_px;
   const auto made = new_feature(camera_, motion_.world_from_cam, px, sigma_px, prior, kind);
   if (!made || !made->feature.values.allFinite() || !made->cov.allFinite()) return false;
-  constexpr double surer = 0.5;  // than the new one, whose distance follows from theirs
+  constexpr double surer = 0.5;  // than that of the new one, which is derived from them
   append_feature(*made, id,
                  prior.is_of_map && config_.holds_frame ? scale_reading(surer * prior.sigma_rel) : ScaleReading());
   return true;
 }
 
-/// P(new, ·) = J P(inputs, ·), P(new, new) = J P Jᵀ + what pixel and distance add. Inputs: the camera, the lens, and
-/// what the scale is read by, if the distance follows from it.
+/// P(new, ·) = J P(inputs, ·), P(new, new) = J P Jᵀ + the covariance of pixel and distance. Inputs: the camera, the
+/// lens, and the components of the scale reading, if the distance derives from it.
 void LocalizationFilter::append_feature(const NewFeature& made, long id, const ScaleReading& scale) {
   Feature feature = made.feature;
   feature.id = id;

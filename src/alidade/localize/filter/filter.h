@@ -19,35 +19,35 @@ class WorldRotation;
 
 enum class ObservationOutcome {
   used,
-  gated,        ///< Too far from where it was expected.
-  not_in_map,   ///< No such feature.
-  not_visible,  ///< The lens does not see the feature from here.
+  gated,        ///< Innovation outside the gate.
+  not_in_map,   ///< No feature with this id.
+  not_visible,  ///< The feature is outside the domain of the lens or behind the camera.
 };
 
 /// Predicted pixel of a feature with its covariance: search its 3σ ellipse.
 struct ExpectedObservation {
   Eigen::Vector2d px;
-  Eigen::Matrix2d S;  ///< Covariance of the innovation, with the pixel's own noise. [px²]
+  Eigen::Matrix2d S;  ///< Innovation covariance, including the pixel noise. [px²]
   double depth_m = 0.0;
 };
 
-/// What became of the observations of one moment.
+/// Result of an update with the observations of one instant.
 struct ObservationsReport {
   std::span<const ObservationOutcome> outcomes;  ///< One per observation; valid until the next update.
-  /// νᵀS⁻¹ν of each when its turn came, behind those before it (of one in a group: its share); NaN if not expected.
+  /// νᵀS⁻¹ν of each when it was processed, given those used before it (in a group: its share); NaN if not predicted.
   std::span<const double> nis;
   std::size_t num_used = 0, num_gated = 0;
-  double nis_per_dof = 0.0;  ///< Of those used, together; 0 where none was.
-  /// −2 ln of the probability of what was seen: νᵀS⁻¹ν + ln det 2πS of those used, at the updated state (Laplace's
-  /// approximation); each gated one is anywhere in a window of 100 px, and one in ten is.
+  double nis_per_dof = 0.0;  ///< Over all used observations together; 0 if none was used.
+  /// −2 ln of the likelihood of the observations: νᵀS⁻¹ν + ln det 2πS of the used ones, at the updated state (Laplace
+  /// approximation); a gated one is taken as uniform in a window of 100 px, with an outlier probability of 0.1.
   double cost = 0.0;
-  bool is_sound = true;  ///< False: nothing positive came out; the state is as it was before.
+  bool is_sound = true;  ///< False: the result was not positive definite or not finite; the state is unchanged.
 };
 
-/// Where a moving camera is, and the points that it sees: an error-state extended Kalman filter over the camera's
-/// motion, the lens where asked, and a map of positions and inverse depths. Drive it by
+/// Motion of a camera and a map of the points that it observes: an error-state extended Kalman filter over the camera's
+/// motion, the lens if requested, and positions and inverse depths of the points. Typical use:
 ///     predict(dt);  expected(id) …;  update(observations);  add(id, px, prior) …;  remove(id)
-/// It allocates nothing after its construction, except for more features than it had before.
+/// Allocates nothing after construction, unless the map holds more features than ever before.
 /// A. J. Davison et al., PAMI 29(6), 2007; J. Civera et al., TRO 24(5), 2008; docs/maths/localization.md.
 class LocalizationFilter {
  public:
@@ -55,29 +55,29 @@ class LocalizationFilter {
                      LocalizationFilterConfig config = {});
 
   void predict(double dt_s);
-  /// Updates with the observations of one moment.
+  /// Updates the state with the observations of one instant.
   ObservationsReport update(std::span<const FeatureObservation> observations);
-  /// A known point, given with the σ of each of its coordinates. False where there is no room, or it is there already.
+  /// Adds a known point; sigma_m is the σ of each coordinate. False if there is no room or the id exists already.
   bool add_known(long id, const Eigen::Vector3d& point_in_world, double sigma_m);
-  /// A feature on the ray of its pixel, fully correlated with camera and lens. False where there is no room, it is
-  /// there already, or the lens sees nothing there.
+  /// Adds a feature on the ray of its pixel, fully correlated with camera and lens. False if there is no room, the id
+  /// exists already, or the lens has no ray for the pixel.
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
   void remove(long id);
-  /// Frame and scale of the state become those of its known points as they were given: fitted_frame.h. For a world of
-  /// which nothing but these points says where and how large it is.
+  /// Aligns frame and scale of the state with its known points as they were given: see fitted_frame.h. For a world
+  /// whose frame and scale are determined by these points only.
   void fit_frame();
-  /// Whether so many more components fit into the state.
+  /// Whether `count` more components fit into the state.
   [[nodiscard]] bool has_room(int count) const { return P_.dim() + count <= config_.state_capacity; }
-  /// Inverse depths that are nearly linear become positions: half the components. Their count.
+  /// Converts inverse depths that are nearly linear to positions, with half the components; returns how many.
   int convert_linear();
-  /// Relocalisation: the camera's correlations with the map are dropped, the map is kept.
+  /// Relocalisation: drops the correlations between camera and map, and keeps the map.
   void place_camera(const CameraMotion& motion, const MotionMatrix& cov);
 
-  /// Where a feature of the map should be seen now. None: not in the map, or not visible.
+  /// Predicted observation of a feature. Empty if it is not in the map or not visible.
   [[nodiscard]] std::optional<ExpectedObservation> expected(long id) const;
   [[nodiscard]] bool has(long id) const { return find(id) != nullptr; }
   [[nodiscard]] const std::vector<Feature>& features() const { return features_; }
-  /// Position of a feature and its covariance, what is given counted. None: not in the map.
+  /// Position of a feature and its covariance, including the contribution of the given numbers. Empty: not in the map.
   struct Place {
     Eigen::Vector3d point_in_world;
     Eigen::Matrix3d cov;
@@ -86,15 +86,15 @@ class LocalizationFilter {
 
   [[nodiscard]] const CameraMotion& motion() const { return motion_; }
   [[nodiscard]] MotionMatrix motion_covariance() const;
-  /// Of the right perturbation ξ = [translation, rotation] of world_from_cam, as everywhere in this library; what is
-  /// given counted.
+  /// Covariance of the right perturbation ξ = [translation, rotation] of world_from_cam, as everywhere in this library;
+  /// includes the contribution of the given numbers.
   [[nodiscard]] Eigen::Matrix<double, 6, 6> pose_covariance() const;
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  /// σ of the lens's parameters that are in the state, in the order of the configuration.
+  /// σ of the lens parameters in the state, in the order of the configuration.
   [[nodiscard]] Eigen::VectorXd lens_sigmas() const;
-  /// What is taken as given: sensitivity of the state to it, and its score test.
+  /// Numbers taken as given (consider parameters): sensitivity of the state to them, and their score test.
   [[nodiscard]] const GivenEffects& given() const { return given_; }
-  /// How the pose's right perturbation moves with each given number.
+  /// Derivative of the pose's right perturbation with respect to each given number.
   [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_given() const;
   [[nodiscard]] int dim() const { return P_.dim(); }
   [[nodiscard]] const StateCovariance& covariance() const { return P_; }
@@ -103,15 +103,15 @@ class LocalizationFilter {
  private:
   using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
                                     StateCovariance::max_columns, StateCovariance::max_columns>;
-  /// An observation with its derivatives by the components of the state that it depends on.
+  /// An observation with its derivatives with respect to the state components that it depends on.
   struct Measured {
     std::size_t observation = 0;
     const Feature* feature = nullptr;
-    Eigen::Matrix<double, 6, 3> J_before = Eigen::Matrix<double, 6, 3>::Zero();  ///< J_before_rotation() of it.
+    Eigen::Matrix<double, 6, 3> J_before = Eigen::Matrix<double, 6, 3>::Zero();  ///< Its J_before_rotation().
     Eigen::Vector2d px = Eigen::Vector2d::Zero();
     double variance_px2 = 0.0;
     Eigen::Vector2d nu = Eigen::Vector2d::Zero();  ///< Innovation at the last linearisation,
-    Eigen::Vector2d c = Eigen::Vector2d::Zero();   ///< and by it at the nominal state: ν(δ) = c − H δ.
+    Eigen::Vector2d c = Eigen::Vector2d::Zero();   ///< and extrapolated to the nominal state: ν(δ) = c − H δ.
     Eigen::Matrix2d S = Eigen::Matrix2d::Identity();
     double nis = 0.0;
     int num_support = 0;
@@ -123,7 +123,7 @@ class LocalizationFilter {
     }
   };
 
-  /// What nobody reads before it is written: a copy has none.
+  /// A buffer that is always written before it is read: copies start empty.
   template <typename Matrix>
   struct Scratch : Matrix {
     Scratch() = default;
@@ -137,7 +137,7 @@ class LocalizationFilter {
   [[nodiscard]] const Feature* find(long id) const;
   void remove_numbers(int offset, int count);
   [[nodiscard]] int num_lens() const { return static_cast<int>(config_.lens_params.size()); }
-  /// Derivatives and innovation at nominal ⊞ delta_. False where it is not seen.
+  /// Jacobian and innovation at nominal ⊞ delta_. False if the feature is not visible there.
   bool linearise(Measured& measured);
   struct Moved;
   [[nodiscard]] Moved moved_by_delta(const Measured& measured, const WorldRotation& turn);
@@ -147,11 +147,11 @@ class LocalizationFilter {
                    Measured& measured) const;
   void expect(Measured& measured) const;  ///< S and NIS from the current covariance.
   void collect(std::span<const FeatureObservation> observations);
-  /// What comes first in an update.
+  /// Order in which an update processes the observations.
   enum class Attempt {
     in_order,      ///< One observation after another.
-    by_consensus,  ///< Those that agree with one of them.
-    jointly,       ///< As many as a group holds, together.
+    by_consensus,  ///< First those that agree with one of them.
+    jointly,       ///< First a full group at once.
   };
   [[nodiscard]] double attempt(Attempt way);
   [[nodiscard]] double attempt_also(Attempt way, double cost);
@@ -164,7 +164,7 @@ class LocalizationFilter {
   void use_in_order();
   void use_together();
   void settle(Measured& measured, bool is_used);
-  /// Iterated update with a few measurements at once. False, and no change, where they have no answer.
+  /// Iterated update with a few measurements at once. False, without any change, if it fails.
   [[nodiscard]] bool take(std::span<Measured*> group);
   [[nodiscard]] bool solve(std::span<Measured*> group);
   struct StepCost {
@@ -172,16 +172,16 @@ class LocalizationFilter {
   };
   [[nodiscard]] bool step(std::span<Measured*> group, bool must_fall, StepCost& at);
   [[nodiscard]] std::optional<double> iterate(std::span<Measured*> group, bool must_fall);
-  /// How far, in σ, the innovation `there`, at delta_, is from what the derivatives `here` say.
+  /// Difference, in σ, between the innovation `there` (at delta_) and its prediction from the linearisation `here`.
   [[nodiscard]] double bend_between(const Measured& here, const Measured& there) const;
-  /// All that were used once more from the prior, linearised where they led: the maximum of the posterior.
+  /// Relinearises all used observations at the updated state and repeats the update from the prior: the posterior mode.
   void refine();
   [[nodiscard]] bool use_again();
   [[nodiscard]] bool finish_update();
-  void drop_update();  ///< The state stays where it was.
+  void drop_update();  ///< Leaves the state as it was before the update.
   void note_used();
   void transform(const FittedFrame& frame);
-  /// The state goes where delta_ says, and the covariance's errors are counted from there.
+  /// Moves the state by delta_, and refers the errors of the covariance to the new state.
   void turn_by_delta();
   void move_by_delta();
   void move_lens_by_delta();
@@ -192,7 +192,7 @@ class LocalizationFilter {
   [[nodiscard]] double relative_variance(const Feature& feature, const RelativeDistance& distance) const;
   [[nodiscard]] ScaleReading scale_reading(double max_sigma_rel) const;
   [[nodiscard]] double best_attempt();
-  /// What the last attempt came to, put aside while another is made, and taken back.
+  /// Sets the result of the last attempt aside while another is made, and restores it.
   void keep_attempt();
   void restore_attempt();
   [[nodiscard]] std::span<const double> error_of(const Feature& feature) const;
@@ -204,9 +204,9 @@ class LocalizationFilter {
   StateCovariance P_;
   GivenEffects given_;
   std::vector<Feature> features_;
-  Eigen::VectorXd delta_;  ///< Error from the nominal state while an update goes on.
+  Eigen::VectorXd delta_;  ///< Error relative to the nominal state during an update.
 
-  // Work of an update, kept so that nothing is allocated.
+  // Work space of an update, kept so that nothing is allocated.
   std::vector<Measured> measured_;
   std::vector<Measured*> waiting_, doubtful_, used_;
   std::vector<ObservationOutcome> outcomes_;
@@ -216,15 +216,15 @@ class LocalizationFilter {
   std::array<Measured, max_in_group> there_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
   bool turns_world_ = false;     ///< Whether the errors of this update are those of world_rotation.h.
-  ScaleReading scale_;           ///< Of the state before the update,
-  std::optional<int> scale_at_;  ///< and its component while the update goes on.
+  ScaleReading scale_;           ///< For the state before the update,
+  std::optional<int> scale_at_;  ///< and the index of its component during the update.
   Camera camera_at_delta_;
   Scratch<Eigen::MatrixXd> joint_x_, joint_s_;
   SmallMatrix triangle_;
   Scratch<Eigen::VectorXd> joint_nu_;
-  double group_prior_ = 0.0;                      ///< What the last step costs before its group is seen: δᵀP⁻¹δ.
-  double group_nis_ = 0.0, group_log_det_ = 0.0;  ///< νᵀS⁻¹ν and ln det S of the group that was solved last,
-  double total_nis_ = 0.0, total_log_det_ = 0.0;  ///< and of all that are used.
+  double group_prior_ = 0.0;                      ///< Prior cost δᵀP⁻¹δ of the last step, without its group.
+  double group_nis_ = 0.0, group_log_det_ = 0.0;  ///< νᵀS⁻¹ν and ln det S of the last solved group,
+  double total_nis_ = 0.0, total_log_det_ = 0.0;  ///< and summed over all used ones.
   std::vector<unsigned char> agrees_, agrees_best_;
   struct KeptAttempt {
     std::vector<ObservationOutcome> outcomes;

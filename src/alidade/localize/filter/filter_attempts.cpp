@@ -3,8 +3,8 @@
 
 #include "alidade/localize/filter/filter.h"
 
-// Which observations of a moment fit together: several attempts from the same prior, of which the one stands that
-// explains the observations best.
+// Data association of one instant: several attempts from the same prior; the one that explains the observations best
+// (lowest cost) is kept.
 
 namespace alidade {
 
@@ -18,7 +18,7 @@ double LocalizationFilter::cost_of_used() const {
          static_cast<double>(num_gated) * cost_gated;
 }
 
-/// From the prior: which observations fit together, and what follows from them.
+/// One attempt from the prior: selects the observations that fit together and updates with them. Returns the cost.
 double LocalizationFilter::attempt(Attempt way) {
   P_.drop_pending();
   delta_.setZero();
@@ -33,7 +33,7 @@ double LocalizationFilter::attempt(Attempt way) {
   if (way == Attempt::jointly) use_first_jointly();
   const auto use = [&] { config_.is_sequential ? use_in_order() : use_together(); };
   use();
-  waiting_.swap(doubtful_);  // what disagreed before may agree with the updated state
+  waiting_.swap(doubtful_);  // those that disagreed before may agree with the updated state
   use();
   if (config_.is_sequential) refine();
   return cost_of_used();
@@ -59,8 +59,8 @@ void LocalizationFilter::restore_attempt() {
   P_.swap_pending();
 }
 
-/// The first that fit in a group, known ones before others, in one step that no gate judges: three or four observations
-/// alone can settle on the wrong one of the poses that explain them, from where the others look wrong.
+/// Uses the first visible ones, as many as fit in a group, known points first, in one ungated step: three or four
+/// observations alone can converge to the wrong one of several poses, from which the others look like outliers.
 void LocalizationFilter::use_first_jointly() {
   const std::size_t num = std::min(waiting_.size(), max_in_group);
   if (num == 0) return;
@@ -71,7 +71,7 @@ void LocalizationFilter::use_first_jointly() {
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(num));
 }
 
-/// Another attempt, which stands if it explains the observations better.
+/// Makes another attempt and keeps it if it explains the observations better; returns the lower cost.
 double LocalizationFilter::attempt_also(Attempt way, double cost) {
   keep_attempt();
   const double other = attempt(way);
@@ -80,7 +80,7 @@ double LocalizationFilter::attempt_also(Attempt way, double cost) {
   return cost;
 }
 
-/// What fits together, with a consensus where observations disagree.
+/// The best attempt; those with a consensus or a joint step are made only where observations disagree.
 double LocalizationFilter::best_attempt() {
   double cost = attempt(Attempt::in_order);
   constexpr std::size_t min_for_another = 4;

@@ -12,7 +12,7 @@ FilterBank::FilterBank(const Camera& camera, std::span<const StartHypothesis> st
     parts_.push_back({LocalizationFilter(camera, start.motion, start.cov, filter), start.cost});
 }
 
-/// Along the camera's x and y; the speed along its axis shows in the size of things at once.
+/// Splits along the camera's x and y; the speed along the optical axis is observable at once, from the change of scale.
 std::vector<StartHypothesis> FilterBank::split(std::span<const StartHypothesis> starts) const {
   std::vector<StartHypothesis> parts;
   const double half = 0.5 * (config_.splits - 1);

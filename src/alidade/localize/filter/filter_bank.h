@@ -14,12 +14,12 @@ struct StartHypothesis {
   double cost = 0.0;
 };
 
-/// Filters with different initial guesses, until the observations decide. In front of a small or flat target, a
+/// Parallel filters with different initial guesses, until the observations decide. In front of a small or flat target,
 /// sideways translation and rotation look alike: the posterior of the first frames is a long curved valley, a Gaussian
 /// fitted to it is overconfident, and one in ten runs diverges. So the prior of the sideways speed is split into
 /// narrower ones (a Gaussian sum; D. L. Alspach & H. W. Sorenson, "Nonlinear Bayesian Estimation Using Gaussian Sum
-/// Approximations", IEEE TAC 17(4), 1972), each weighted by its likelihood. The two poses of a flat
-/// target are two starts.
+/// Approximations", IEEE TAC 17(4), 1972), each weighted by its likelihood. The two possible poses of a flat
+/// target are two hypotheses.
 class FilterBank {
  public:
   FilterBank(const Camera& camera, std::span<const StartHypothesis> starts, const LocalizationFilterConfig& filter,
@@ -28,12 +28,12 @@ class FilterBank {
   void predict(double dt_s);
   ObservationsReport update(std::span<const FeatureObservation> observations);
   void add_known(long id, const Eigen::Vector3d& point_in_world, double sigma_m);
-  /// False where the best filter cannot.
+  /// False if the best filter cannot add it.
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
   void remove(long id);
   int convert_linear();
   void fit_frame();
-  /// Starts again from these, with the map as it is.
+  /// Restarts from these hypotheses and keeps the map.
   void restart(std::span<const StartHypothesis> starts);
 
   [[nodiscard]] const LocalizationFilter& best() const { return parts_[best_].filter; }

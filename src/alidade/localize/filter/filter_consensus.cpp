@@ -5,20 +5,20 @@
 #include "alidade/localize/filter/filter.h"
 
 // One-point consensus (J. Civera et al., "1-Point RANSAC for EKF Filtering", J. Field Robotics 27(5), 2010) in the
-// space of innovations: with the joint covariance S of all innovations, one of them, taken as right, predicts every
-// other: ν_i − S_ij S_jj⁻¹ ν_j with covariance S_ii − S_ij S_jj⁻¹ S_ji. No state is updated, and every one is tried.
+// space of innovations: with the joint covariance S of all innovations, one of them, assumed an inlier, predicts every
+// other: ν_i − S_ij S_jj⁻¹ ν_j with covariance S_ii − S_ij S_jj⁻¹ S_ji. No state is updated, and all are tried in turn.
 
 namespace alidade {
 namespace {
 
 constexpr std::size_t max_for_snooping = 40;  // S is inverted as a whole
-constexpr int max_dropped = 6;                // the gates of the update find what is left
+constexpr int max_dropped = 6;                // the gates of the update reject the remaining ones
 
 }  // namespace
 
 void LocalizationFilter::fill_joint_innovations() {
   const std::size_t num = waiting_.size();
-  if (joint_x_.size() == 0) {  // only for those who meet mismatches
+  if (joint_x_.size() == 0) {  // allocated only when mismatches occur
     joint_x_.resize(P_.capacity(), 2 * config_.observations_capacity);
     joint_s_.resize(2 * config_.observations_capacity, 2 * config_.observations_capacity);
     joint_nu_.resize(2 * config_.observations_capacity);
@@ -44,7 +44,7 @@ void LocalizationFilter::fill_joint_innovations() {
   }
 }
 
-/// What the others cost if `chosen` is right: their NIS, each at most the gate. Who agrees stands in `agrees_`.
+/// Cost if `chosen` is an inlier: the sum of all NIS, each capped at the gate. Inliers are marked in `agrees_`.
 double LocalizationFilter::agreement_with(std::size_t chosen) {
   const auto j = static_cast<Eigen::Index>(2 * chosen);
   const Eigen::Matrix2d S_jj = joint_s_.block<2, 2>(j, j);
@@ -64,16 +64,16 @@ double LocalizationFilter::agreement_with(std::size_t chosen) {
   return cost;
 }
 
-/// Of those that agree, each against what all others together say of it: νᵢ given the rest has information (S⁻¹)ᵢᵢ and
-/// weighted innovation (S⁻¹ν)ᵢ. The worst leaves while one is beyond the gate. W. Baarda, "A Testing Procedure for Use
-/// in Geodetic Networks", 1968.
+/// Data snooping: each of the agreeing observations against the prediction from all others: νᵢ given the rest has
+/// information (S⁻¹)ᵢᵢ and weighted innovation (S⁻¹ν)ᵢ. The worst one beyond the gate is removed, repeatedly.
+/// W. Baarda, "A Testing Procedure for Use in Geodetic Networks", 1968.
 void LocalizationFilter::drop_doubtful() {
   for (int dropped = 0; dropped < max_dropped && waiting_.size() > 3; ++dropped) {
     if (waiting_.size() > max_for_snooping) return;
     fill_joint_innovations();
     const auto num = static_cast<Eigen::Index>(2 * waiting_.size());
     auto S = joint_s_.topLeftCorner(num, num);
-    auto inverse = joint_x_.topLeftCorner(num, num);  // its content is used up
+    auto inverse = joint_x_.topLeftCorner(num, num);  // its content is no longer needed
     if (joint_x_.rows() < num) return;
     Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);
     if (llt.info() != Eigen::Success) return;

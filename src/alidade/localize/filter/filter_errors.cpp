@@ -3,7 +3,7 @@
 #include "alidade/localize/filter/filter.h"
 #include "alidade/localize/filter/world_rotation.h"
 
-// What an error of the state is: what is seen of it, and how the state moves by one. See world_rotation.h.
+// The error state: how observations depend on it, and how the nominal state absorbs it. See world_rotation.h.
 
 namespace alidade {
 namespace {
@@ -14,18 +14,18 @@ double& lens_param(Camera& camera, int index) {
 
 }  // namespace
 
-/// Where an update's steps have led: a pose and the point that is seen.
+/// Pose and feature displaced by the current delta_ of an update.
 struct LocalizationFilter::Moved {
   Rigid3 world_from_cam;
   Feature feature;
 };
 
-/// The camera's lens moves in `camera_at_delta_`.
+/// The displaced lens is written to `camera_at_delta_`.
 LocalizationFilter::Moved LocalizationFilter::moved_by_delta(const Measured& measured, const WorldRotation& turn) {
   const Feature& nominal = *measured.feature;
   Moved moved{motion_.world_from_cam, nominal};
   auto& [world_from_cam, feature] = moved;
-  if (turns_world_) {  // the camera keeps its attitude: nothing measured depends on how the world is rotated
+  if (turns_world_) {  // the camera keeps its attitude: no measurement depends on the rotation of the world
     world_from_cam.translation = turn.position_before(world_from_cam.translation, delta_.head<3>());
     feature = turn.feature_before(nominal, error_of(nominal), measured.J_before);
   } else {
@@ -51,7 +51,7 @@ Eigen::Matrix<double, 2, 3> LocalizationFilter::J_px_rotation(const ExpectedView
     return (view.J_px_pose.leftCols<3>() * p_cross + view.J_px_feature * measured.J_before) * turn.world_from_cam();
   const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(3));
   Eigen::Matrix<double, 2, 3> J_rotation = view.J_px_pose.rightCols<3>() * J;
-  if (config_.holds_frame) {  // by errors counted from where the update began
+  if (config_.holds_frame) {  // errors refer to the state at which the update began
     const Eigen::Matrix3d R = turn.world_from_cam(), RJ = R * J.transpose();
     J_rotation += view.J_px_pose.leftCols<3>() * (p_cross * R - cross_matrix(moved.world_from_cam.translation) * RJ);
     J_rotation += view.J_px_feature * (measured.J_before * R - J_before_rotation(moved.feature) * RJ);
@@ -59,7 +59,7 @@ Eigen::Matrix<double, 2, 3> LocalizationFilter::J_px_rotation(const ExpectedView
   return J_rotation;
 }
 
-/// The observation's Jacobian, by the columns that are not zero.
+/// Stores the observation's Jacobian as its non-zero columns.
 void LocalizationFilter::put_columns(const ExpectedView& view, const Eigen::Matrix<double, 2, 3>& J_rotation,
                                      const Moved& moved, Measured& measured) const {
   const auto& [world_from_cam, feature] = moved;
@@ -103,7 +103,7 @@ std::span<const double> LocalizationFilter::error_of(const Feature& feature) con
   return {delta_.data() + feature.offset, static_cast<std::size_t>(feature.dim())};
 }
 
-/// The state moves, and errors are counted from where it is then: world_rotation.h.
+/// Moves the state by delta_ and re-references the errors to the new state: world_rotation.h.
 void LocalizationFilter::turn_by_delta() {
   const WorldRotation turn(motion_.world_from_cam, delta_.segment<3>(3));
   const Eigen::Matrix3d G = turn.G(), J_left = right_jacobian(-turn.xi()), R = turn.world_from_cam();
@@ -111,7 +111,7 @@ void LocalizationFilter::turn_by_delta() {
   motion_ = retract(was, delta_.head<motion_dim>());
   motion_.world_from_cam.translation = G * turn.position_before(was.world_from_cam.translation, delta_.head<3>());
   motion_.velocity_in_world = G * turn.position_before(was.velocity_in_world, delta_.segment<3>(6));
-  // First each error is rotated with its position, then what the rotation's error adds.
+  // First rotate each error with its position, then add the contribution of the rotation error.
   const auto block = [&](int row) { return shear_.block<3, 3>(row, 0); };
   block(0) = block(6) = G;
   block(3) = block(9) = Eigen::Matrix3d::Identity();
@@ -135,7 +135,7 @@ void LocalizationFilter::turn_by_delta() {
     feature = WorldRotation::turned(G, turn.feature_before(before, error_of(before), J_before));
     block(feature.offset) = added(before.values.head<3>(), feature.values.head<3>());
     if (feature.dim() < 6) continue;
-    const Eigen::Matrix3d J_rotated = block(feature.offset + 3);  // as it stands there
+    const Eigen::Matrix3d J_rotated = block(feature.offset + 3);  // the block of turn(), not overwritten yet
     block(feature.offset + 3) =
         (J_rotated * J_before.bottomRows<3>() - J_before_rotation(feature).bottomRows<3>() * J_left) * R;
   }
@@ -144,8 +144,8 @@ void LocalizationFilter::turn_by_delta() {
   given_.shear(rotation_at, shear_.data(), P_.capacity(), P_.dim());
 }
 
-/// The state moves by delta_, and the covariance's errors are counted from there: the rotation's by the right Jacobian,
-/// the others so that a rotation of the world stays one.
+/// Moves the state by delta_ and re-references the errors of the covariance: the rotation's by the right Jacobian,
+/// the others such that a rotation of the world remains one.
 void LocalizationFilter::move_by_delta() {
   constexpr int rotation_at = 3;
   const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(rotation_at));
@@ -173,7 +173,7 @@ void LocalizationFilter::move_by_delta() {
   given_.shear(rotation_at, shear_.data(), P_.capacity(), P_.dim());
 }
 
-/// What is given moves the state by what those used say of it, at the state that they led to.
+/// Updates the sensitivity to the given numbers with the used observations, linearised at the updated state.
 void LocalizationFilter::count_given() {
   if (given_.num() == 0 || used_.empty()) return;
   for (const Measured* measured : used_) {

@@ -5,11 +5,11 @@
 #include "alidade/localize/filter/filter.h"
 #include "alidade/localize/filter/world_rotation.h"
 
-// What an error of the world's scale is, and how it moves with the state: world_scale.h.
+// The error of the world's scale and how it is transferred when the state moves: world_scale.h.
 
 namespace alidade {
 
-/// Of the distance between camera and feature, over the distance.
+/// Relative variance of the distance between camera and feature.
 double LocalizationFilter::relative_variance(const Feature& feature, const RelativeDistance& distance) const {
   double variance = 0.0;
   const auto at = [&](int i) { return i < 3 ? i : feature.offset + i - 3; };
@@ -19,7 +19,7 @@ double LocalizationFilter::relative_variance(const Feature& feature, const Relat
   return variance;
 }
 
-/// By the surest distances of the map, each with a smaller σ; empty where there is none.
+/// Reading by the most certain distances of the map with a relative σ below the limit; empty if there is none.
 ScaleReading LocalizationFilter::scale_reading(double max_sigma_rel) const {
   using Candidate = std::pair<double, const Feature*>;
   std::array<Candidate, ScaleReading::max_features> surest{};
@@ -43,9 +43,9 @@ ScaleReading LocalizationFilter::scale_reading(double max_sigma_rel) const {
   return reading;
 }
 
-/// What the scale is read by becomes a component of the state while an update goes on: cᵀe.
+/// Appends the scale reading cᵀe to the state for the duration of an update.
 void LocalizationFilter::begin_scale() {
-  constexpr double sure_enough = 0.1;  // a vaguer distance says nothing of the scale
+  constexpr double sure_enough = 0.1;  // less certain distances carry no information about the scale
   scale_at_.reset();
   scale_ = scale_reading(sure_enough);
   const int at = P_.dim();
@@ -68,8 +68,8 @@ void LocalizationFilter::end_scale() {
   scale_at_.reset();
 }
 
-/// The state's scale follows, and what the covariance holds along the scale before, it holds along that after. An
-/// update by which the world would be less than half as large is far from linear: the scale follows to a half alone.
+/// Applies the scale, and transfers the covariance along the old scale direction to the new one. An update that would
+/// shrink the world by more than half is far from linear: the scale is then limited to one half.
 void LocalizationFilter::count_scale() {
   constexpr double smallest = -0.5;
   const double eps = delta_[*scale_at_], scale = 1.0 + std::max(eps, smallest);

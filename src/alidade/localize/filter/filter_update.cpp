@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t max_singly = 12;  // used one by one, before the rest, whose pose is sure by then, in groups
+constexpr std::size_t max_singly = 12;  // processed one by one; the rest follows in groups, when the pose is well known
 
 }  // namespace
 
@@ -65,7 +65,7 @@ void LocalizationFilter::collect(std::span<const FeatureObservation> observation
   }
 }
 
-/// S⁻¹ of the whole group and what follows from it: the step in `next_`, L⁻ᵀ in `triangle_`.
+/// Solves with S of the whole group: the updated error in `next_`, L⁻ᵀ in `triangle_`.
 bool LocalizationFilter::solve(std::span<Measured*> group) {
   std::array<StateCovariance::Rows, max_in_group> rows{};
   for (std::size_t m = 0; m < group.size(); ++m) rows[m] = group[m]->rows();
@@ -80,7 +80,7 @@ bool LocalizationFilter::solve(std::span<Measured*> group) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(measured.num_support); ++k) {
       const int column = measured.columns[k];
       rhs[a] -= h[k] * start_[column];
-      for (int b = 0; b <= a; ++b) S(a, b) += h[k] * P_.product_at(column, b);  // below the diagonal: LLᵀ needs no more
+      for (int b = 0; b <= a; ++b) S(a, b) += h[k] * P_.product_at(column, b);  // lower triangle only, for LLᵀ
     }
     S(a, a) += measured.variance_px2;
   }
@@ -109,16 +109,16 @@ double LocalizationFilter::bend_between(const Measured& here, const Measured& th
   return std::sqrt((there.nu - predicted).squaredNorm() / here.variance_px2);
 }
 
-/// To `next_`; if it `must_fall`, only so far towards it that the cost falls. The cost is what the step costs before
-/// the group is seen, and the group's residuals; the group as linearised there is in `there_`. False, and no step,
-/// where there is none.
+/// Moves delta_ to `next_`; with `must_fall`, only as far towards it as the cost decreases. The cost is the prior cost
+/// of the step plus the residuals of the group; the group relinearised at the new delta_ is in `there_`. False, with
+/// delta_ unchanged, if no such step exists.
 bool LocalizationFilter::step(std::span<Measured*> group, bool must_fall, StepCost& at) {
   constexpr double min_share = 0.05, rounding = 1e-6;
   const int dim = P_.dim();
   before_.head(dim) = delta_.head(dim);
   for (double share = 1.0; share > min_share; share *= 0.5) {
     delta_.head(dim) = before_.head(dim) + share * (next_.head(dim) - before_.head(dim));
-    const double prior = (1.0 - share) * at.prior + share * group_prior_;  // at most: it is convex
+    const double prior = (1.0 - share) * at.prior + share * group_prior_;  // an upper bound: it is convex
     double all = prior;
     for (std::size_t m = 0; m < group.size(); ++m) {
       there_[m] = *group[m];
@@ -133,19 +133,19 @@ bool LocalizationFilter::step(std::span<Measured*> group, bool must_fall, StepCo
   return false;
 }
 
-/// Gauss–Newton from `start_`: what it came to in delta_, the cost of that. None where there is no step.
+/// Gauss–Newton from `start_`: leaves the result in delta_ and returns its cost. Empty if no step could be made.
 std::optional<double> LocalizationFilter::iterate(std::span<Measured*> group, bool must_fall) {
   StepCost at;
   for (const Measured* measured : group) at.all += measured->nu.squaredNorm() / measured->variance_px2;
   bool has_answer = false;
-  constexpr int slower = 8;  // are shortened steps
+  constexpr int slower = 8;  // shortened steps converge more slowly
   const int max_iterations = (must_fall ? slower : 1) * config_.max_iterations;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!solve(group)) break;
-    if (!has_answer && group.size() > 1) {  // what they share is counted once
+    if (!has_answer && group.size() > 1) {  // each gets an equal share: correlations are counted once
       for (Measured* measured : group) measured->nis = group_nis_ / static_cast<double>(group.size());
     }
-    if (config_.max_iterations == 1) {  // a linearisation taken at its word
+    if (config_.max_iterations == 1) {  // plain EKF: no relinearisation
       delta_.head(P_.dim()) = next_.head(P_.dim());
       return group_nis_;
     }
@@ -162,8 +162,8 @@ std::optional<double> LocalizationFilter::iterate(std::span<Measured*> group, bo
 bool LocalizationFilter::take(std::span<Measured*> group) {
   const int dim = P_.dim();
   start_.head(dim) = delta_.head(dim);
-  // Whole steps find the way past a curve. From far away, behind the edge of a strong lens, they can end anywhere: then
-  // again with steps that do not.
+  // Full steps get across a strong curvature. From far away, beyond the edge of a strong lens, they can end anywhere:
+  // then repeat with steps that must decrease the cost.
   auto cost = iterate(group, false);
   if (!(cost && *cost <= config_.gate * static_cast<double>(group.size()))) {
     delta_.head(dim) = start_.head(dim);
@@ -217,8 +217,8 @@ void LocalizationFilter::settle(Measured& measured, bool is_used) {
   nis_[measured.observation] = measured.nis;
 }
 
-/// One by one, each at its own linearisation behind those before it: known points first, then by the size of what is
-/// expected of the innovation. From the `max_singly`th on in groups.
+/// One by one, each relinearised after those before it: known points first, then in ascending order of the predicted
+/// innovation variance. After `max_singly` used ones in groups.
 void LocalizationFilter::use_in_order() {
   std::size_t num_used = 0;
   while (!waiting_.empty()) {
@@ -251,7 +251,7 @@ void LocalizationFilter::use_in_order() {
   }
 }
 
-/// All at once, as far as a group goes.
+/// All at once, in groups of the maximum size, in the given order.
 void LocalizationFilter::use_together() {
   std::size_t num = 0;
   std::array<Measured*, max_in_group> group{};
@@ -306,7 +306,7 @@ ObservationsReport LocalizationFilter::update(std::span<const FeatureObservation
     cost = best_attempt();
   }
   ObservationsReport report{outcomes_, nis_};
-  // Each observation was within the gate when it was used: together they cannot be farther from what they led to.
+  // Each used observation was within the gate: the total NIS must not exceed the sum of the gates.
   const bool agrees = total_nis_ <= config_.gate * 2.0 * static_cast<double>(std::max<std::size_t>(1, used_.size()));
   if (!agrees) drop_update();
   report.is_sound = agrees && finish_update();

@@ -11,7 +11,7 @@ namespace {
 
 bool counts(const Feature& feature) { return feature.is_known && feature.was_used; }
 
-/// The mean of those that count, by their weights; their number.
+/// Weighted mean of the known points that were used; returns their number.
 int centre_of(std::span<const Feature> features, Eigen::Vector3d& centre) {
   double sum = 0.0;
   int num = 0;
@@ -51,7 +51,7 @@ Eigen::Matrix3d FittedFrame::J_angles(const Feature& feature) const {
 std::optional<FittedFrame> fitted_frame(std::span<const Feature> features) {
   FittedFrame frame;
   if (centre_of(features, frame.centre) < 3) return std::nullopt;
-  Eigen::Matrix<double, 7, 7> information = Eigen::Matrix<double, 7, 7>::Zero();  // by shift, rotation, ln s
+  Eigen::Matrix<double, 7, 7> information = Eigen::Matrix<double, 7, 7>::Zero();  // order: shift, rotation, ln s
   Eigen::Vector<double, 7> rhs = Eigen::Vector<double, 7>::Zero();
   for (const Feature& feature : features) {
     if (!counts(feature)) continue;
@@ -63,7 +63,7 @@ std::optional<FittedFrame> fitted_frame(std::span<const Feature> features) {
     rhs += weight * J.transpose() * (feature.given_in_world - feature.values.head<3>());
   }
   const Eigen::LDLT<Eigen::Matrix<double, 7, 7>> ldlt(information);
-  constexpr double vague = 0.1;  // rad, or of the scale: too far for a linear step
+  constexpr double vague = 0.1;  // rad, or relative scale: beyond it a linear step is not valid
   const Eigen::Matrix<double, 7, 7> cov = ldlt.solve(Eigen::Matrix<double, 7, 7>::Identity());
   if (ldlt.info() != Eigen::Success || !cov.allFinite()) return std::nullopt;
   const Eigen::Vector4d variances = cov.diagonal().tail<4>();
@@ -82,13 +82,13 @@ void LocalizationFilter::note_used() {
 }
 
 void LocalizationFilter::fit_frame() {
-  constexpr double noticeable = 0.01;  // a tenth of σ, squared
+  constexpr double noticeable = 0.01;  // (0.1 σ)²
   const auto frame = fitted_frame(features_);
   if (frame && frame->chi2 > noticeable) transform(*frame);
 }
 
-/// The errors that the covariance counts are transformed with the state. Known points of which nothing was used stand
-/// where they were given.
+/// Transforms the state and the errors of its covariance. Known points without any used observation return to their
+/// given positions.
 void LocalizationFilter::transform(const FittedFrame& frame) {
   const auto block = [&](int row) { return shear_.block<3, 3>(row, 0); };
   Rigid3& world_from_cam = motion_.world_from_cam;

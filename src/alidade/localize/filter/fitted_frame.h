@@ -6,33 +6,33 @@
 
 #include "alidade/localize/filter/feature.h"
 
-// No observation depends on where the world is, how it is rotated or how large it is. So the posterior along these
-// seven directions is the prior's, and that is the known points': at its maximum no similarity T of the estimate
-// lessens
+// Observations do not depend on the position, rotation and scale of the world. So the posterior along these seven
+// directions equals the prior, and that is given by the known points: at its maximum, no similarity transform T of the
+// estimate lowers
 //     Σ |T(p̂ᵢ) − pᵢ|² / σᵢ²,
-// the p̂ᵢ the estimates of the points that were given as pᵢ. A linear filter keeps that for ever. One that is linearised
-// anew in every update errs by its second order, and what it errs by along these directions nothing seen corrects: its
-// frame and its scale drift as long as it runs, and its covariance says nothing of it. This T takes it back. The shape
-// of the map, and with it everything that is expected of an observation, stays as it is.
+// where p̂ᵢ is the estimate of the point given as pᵢ. A linear filter preserves this. A filter that is relinearised in
+// every update has second-order errors, and along these directions no observation corrects them: its frame and scale
+// drift as long as it runs, without a trace in its covariance. The T that minimises the sum removes this drift. The
+// shape of the map, and with it every predicted observation, stays the same.
 
 namespace alidade {
 
-/// x → centre + shift + s G (x − centre), of small size.
+/// x → centre + shift + s G (x − centre); a small transform.
 struct FittedFrame {
   Eigen::Vector3d centre, shift;
   Eigen::Matrix3d G;
   double s = 1.0;
-  double chi2 = 0.0;  ///< By how much it lessens the sum above.
+  double chi2 = 0.0;  ///< Decrease of the sum above.
 
   [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& place) const {
     return centre + shift + s * (G * (place - centre));
   }
   [[nodiscard]] Feature operator*(const Feature& feature) const;
-  /// Derivative of θ, φ, ρ of an inverse depth, transformed, by what they were.
+  /// Derivative of the transformed θ, φ, ρ of an inverse-depth feature with respect to the original ones.
   [[nodiscard]] Eigen::Matrix3d J_angles(const Feature& feature) const;
 };
 
-/// One Gauss–Newton step: of the known points that were used. None where they do not determine it.
+/// One Gauss–Newton step over the known points that were used. Empty if they do not determine it.
 [[nodiscard]] std::optional<FittedFrame> fitted_frame(std::span<const Feature> features);
 
 }  // namespace alidade

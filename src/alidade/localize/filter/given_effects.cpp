@@ -44,7 +44,7 @@ void GivenEffects::predict(const MotionMatrix& F) {
   }
 }
 
-/// A given position grows with the scale.
+/// A given position is proportional to the scale of the target.
 void GivenEffects::add_known(int offset, const Eigen::Vector3d& point_in_world) {
   M_.middleRows<3>(offset).setZero();
   M_.block<3, 1>(offset, M_.cols() - 1) = point_in_world;
@@ -164,7 +164,7 @@ void GivenEffects::finish(const StateCovariance& P) {
   rows_.clear();
   for (int j = 0; j < dim; ++j)
     if (!G_.row(j).isZero(0.0)) rows_.push_back(j);
-  for (Eigen::Index c = 0; c < G_.cols(); c += 2) {  // G's last column is twice there where their number is odd
+  for (Eigen::Index c = 0; c < G_.cols(); c += 2) {  // if the number of columns is odd, the last one is processed twice
     const Eigen::Index next = std::min(c + 1, G_.cols() - 1);
     for (std::size_t k = 0; k < rows_.size(); ++k) {
       weights_[0][k] = -G_(rows_[k], c);

@@ -12,47 +12,47 @@
 
 namespace alidade {
 
-/// Consider parameters: how a filter's state depends on what it takes as given: the lens, where not in the state, and
-/// the target's scale. The filter's gains are those of one that takes these as exact; what their covariance Σ adds to
-/// the state's is M Σ Mᵀ, with M = ∂state/∂given carried beside it: M ← F M in a prediction, M ← M − P⁺ Hᵀ R⁻¹ (H M +
-/// H_g) in an update, and as P where errors are counted again (S. F. Schmidt, "Application of State-Space Methods to
-/// Navigation Problems", 1966; here the gains do not know of it). Score tests of the given numbers follow from it:
-/// with D = H M + H_g, score Dᵀ S⁻¹ ν = Dᵀ R⁻¹ r of the residuals r, and information Dᵀ R⁻¹ (D + H (M⁺ − M)).
-/// Allocates nothing after its construction.
+/// Consider parameters: sensitivity of a filter's state to what it takes as given: the lens, unless in the state, and
+/// the scale of the target. The gains are computed as if these were exact; their covariance Σ adds M Σ Mᵀ to the
+/// covariance of the state, with M = ∂state/∂given propagated beside it: M ← F M in a prediction,
+/// M ← M − P⁺ Hᵀ R⁻¹ (H M + H_g) in an update, and like P where the errors are re-referenced (S. F. Schmidt,
+/// "Application of State-Space Methods to Navigation Problems", 1966; unlike there, the gains ignore Σ). Score tests of
+/// the given numbers follow from it: with D = H M + H_g, score Dᵀ S⁻¹ ν = Dᵀ R⁻¹ r of the residuals r, and information
+/// Dᵀ R⁻¹ (D + H (M⁺ − M)). Allocates nothing after its construction.
 class GivenEffects {
  public:
-  static constexpr int max_given = 17;  ///< A lens's parameters and the scale.
+  static constexpr int max_given = 17;  ///< Lens parameters and the scale.
   using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
 
   GivenEffects() = default;
-  /// Of the lens: fx, fy, cx, cy, k1, a port's water, gap and normal, and whatever has a covariance, except
-  /// `estimated`.
+  /// Lens parameters considered: fx, fy, cx, cy, k1, a port's water index, gap and normal, and every one that has a
+  /// covariance, except those in `estimated`.
   GivenEffects(const Camera& camera, std::span<const int> estimated, double sigma_scale, int capacity,
                int observations);
 
   [[nodiscard]] int num() const { return static_cast<int>(M_.cols()); }
-  [[nodiscard]] const std::vector<int>& lens_params() const { return lens_params_; }  ///< Then the scale.
-  [[nodiscard]] const Eigen::MatrixXd& cov() const { return cov_; }                   ///< Σ; zero where none is known.
+  [[nodiscard]] const std::vector<int>& lens_params() const { return lens_params_; }  ///< The scale follows them.
+  [[nodiscard]] const Eigen::MatrixXd& cov() const { return cov_; }                   ///< Σ; zero where unknown.
   [[nodiscard]] const Eigen::VectorXd& score() const { return score_; }
   [[nodiscard]] const Eigen::MatrixXd& information() const { return information_; }
-  /// Of the score, as the observations of one point share their errors and those of different points do not: Σ s sᵀ of
-  /// what each adds to it.
+  /// Cluster-robust covariance of the score: observations of one point share errors, those of different points do not;
+  /// Σ s sᵀ over the points, with s the contribution of one point.
   [[nodiscard]] Eigen::MatrixXd score_cov() const { return of_left_ + by_point_.transpose() * by_point_; }
-  [[nodiscard]] bool counts() const { return counts_; }  ///< Whether Σ is anything.
+  [[nodiscard]] bool counts() const { return counts_; }  ///< Whether Σ is non-zero.
   [[nodiscard]] auto rows(int first, int count) const { return M_.middleRows(first, count); }
 
   void predict(const MotionMatrix& F);
   void add_known(int offset, const Eigen::Vector3d& point_in_world);
   void add(int offset, const NewFeature& made, std::span<const int> estimated, const ScaleReading& scale);
-  void remove(int offset, int count, int dim);  ///< `dim` before.
+  void remove(int offset, int count, int dim);  ///< `dim`: state size before.
   void make_place(int offset, const Eigen::Matrix<double, 3, 6>& J);
-  void forget_motion();  ///< Of a camera that is localised again; and what was scored.
-  /// As those of StateCovariance.
+  void forget_motion();  ///< After a relocalisation: resets the camera's rows and the scores.
+  /// The same operations as those of StateCovariance.
   void turn(const double* blocks, int stride, int single_at, int num_single, int dim);
   void shear(int at, const double* K, int stride, int dim);
   void shear_along(std::span<const int> columns, std::span<const double> weights, const double* u, int dim);
 
-  /// The observations of an update, at the state that they led to; then what they change.
+  /// Adds an observation of an update, linearised at the updated state; finish() then applies their effect on M.
   void add_observation(const ExpectedView& view, const Feature& feature, std::span<const int> estimated,
                        const Eigen::Vector2d& residual_px, double variance_px2);
   void finish(const StateCovariance& P);
@@ -73,10 +73,10 @@ class GivenEffects {
   Eigen::MatrixXd cov_, information_;
   Eigen::VectorXd score_;
   Columns M_, change_, G_;
-  std::vector<int> rows_;  ///< Of G those that are not zero, and two columns of them.
+  std::vector<int> rows_;  ///< Non-zero rows of G; `weights_`: two columns of them.
   std::array<std::vector<double>, 2> weights_;
-  Columns by_point_;         ///< What each feature adds to the score, in the row of its first number.
-  Eigen::MatrixXd of_left_;  ///< Σ s sᵀ of those that have left.
+  Columns by_point_;         ///< Contribution of each feature to the score, in its first row.
+  Eigen::MatrixXd of_left_;  ///< Σ s sᵀ of the features that were removed.
   std::vector<Seen> seen_;
   std::size_t max_seen_ = 0;
   bool counts_ = false;

@@ -13,7 +13,7 @@ constexpr std::array<std::string_view, 6> pose_numbers{"the position across (x)"
                                                        "the distance (z)",        "the rotation about x",
                                                        "the rotation about y",    "the rotation about z"};
 
-/// Of a change along `direction`: how the path moves, and what the observations say.
+/// For a change along `direction`: its effect on the path, and its score test.
 GivenNumber given_number(std::string_view name, const Eigen::VectorXd& direction, const GivenSystem& system) {
   GivenNumber given{.name = name};
   for (std::size_t k = 0; k < system.J_pose.size(); ++k)
@@ -28,9 +28,9 @@ GivenNumber given_number(std::string_view name, const Eigen::VectorXd& direction
   return given;
 }
 
-/// A port that was not calibrated with its lens: what its observations say of it, the focal length says nearly alike,
-/// and is named. Beside a lens that is not estimated a smoothed path says of the water what neither focal length nor k1
-/// say alone.
+/// Parameters of a port that was not calibrated with its lens. In the observations they are nearly indistinguishable
+/// from the focal length, which is reported instead. Only with a lens that is not estimated, a smoothed path provides a
+/// score of the water's index that neither focal length nor k1 explains alone.
 template <class Place, class Add>
 void add_port(const GivenSystem& system, const Place& place, const Add& add, std::vector<GivenNumber>& all) {
   const Eigen::Index gap = place("gap_m");
@@ -90,7 +90,7 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
   }
   add_port(system, place, add, all);
   add("scale of the target", direction_of(num), std::sqrt(system.cov(num, num)));
-  all.back().asked = all.back().z = 0.0;  // all may be larger: no observation shows it
+  all.back().asked = all.back().z = 0.0;  // unobservable: all distances may be larger by the same factor
   const auto at_cause = [&](int cause) { return direction_of(num + cause); };
   if (system.score.size() < num + num_causes) return all;
   add("shape of the target", at_cause(shape_cause), std::nullopt);
@@ -103,7 +103,7 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
 std::vector<GivenNumber> GivenTally::take_recent(const LocalizationFilter& filter) {
   const GivenEffects& given = filter.given();
   const Said now{given.score(), given.information(), given.score_cov()};
-  // A filter that began again has forgotten what was scored: from there on.
+  // A filter that restarted has lost its scores: count from there on.
   const bool goes_on = before_.score.size() == now.score.size() &&
                        (now.information.diagonal().array() >= before_.information.diagonal().array()).all();
   const Said since = std::exchange(before_, now);

@@ -5,33 +5,33 @@
 
 namespace alidade {
 
-/// What is left of a path's normal equations for the parameters that are given: those of the lens by their indices in
-/// it, then the target's scale; of a smoothed path also its shape, its speed (3), the image's readout and its rotation
-/// (3).
+/// The normal equations of a path, reduced to the given parameters (all else eliminated): those of the lens, by their
+/// indices in it, then the scale of the target; for a smoothed path also the target's shape, its speed (3), the readout
+/// time of the image and the target's rotation rate (3).
 struct GivenSystem {
   const Camera& camera;
   const std::vector<int>& lens_params;
-  const Eigen::MatrixXd& cov;   ///< Counted; zero where none is known.
-  const Eigen::VectorXd score;  ///< Jᵀr by each, all else at its best,
+  const Eigen::MatrixXd& cov;   ///< Prior, included in σ; zero where unknown.
+  const Eigen::VectorXd score;  ///< Jᵀr, with all else at its optimum.
   const Eigen::MatrixXd& information;
-  const Eigen::MatrixXd score_cov;                                      ///< As errors are, where that is more.
-  const std::vector<Eigen::Matrix<double, 6, Eigen::Dynamic>>& J_pose;  ///< How poses move with each.
+  const Eigen::MatrixXd score_cov;                                      ///< Cluster-robust, where larger.
+  const std::vector<Eigen::Matrix<double, 6, Eigen::Dynamic>>& J_pose;  ///< ∂pose/∂each.
   const std::vector<Eigen::Matrix<double, 6, 6>>& pose_cov;
 };
 
-/// Focal length (relative), centre (px), k1 (absolute, in a hundredth) and scale of the target (relative), as far as
-/// they are given and not estimated; of a port that has no covariance, the water's index, the gap (m) and the normal.
-/// Then of a smoothed path: shape of the target (x longer and y shorter, relative), its speed (m/s), readout (s), and
-/// how fast the target rotates about its centre (rad/s).
+/// Focal length (relative), centre (px), k1 (absolute, in hundredths) and scale of the target (relative), unless they
+/// are estimated; for a port without covariance also the water's index, the gap (m) and the normal.
+/// For a smoothed path then: shape of the target (x longer and y shorter, relative), its speed (m/s), readout (s), and
+/// rotation rate of the target about its centre (rad/s).
 [[nodiscard]] std::vector<GivenNumber> given_numbers(const GivenSystem& system);
 
-/// What was given to a filter, over a run: the largest moves of its poses, and what its observations said.
+/// The given numbers of a filter over a run: the largest change of its poses by each, and its score test.
 class GivenTally {
  public:
   void add(const LocalizationFilter& filter);
   [[nodiscard]] const std::vector<GivenNumber>& numbers() const { return numbers_; }
-  /// What the observations said since this was last asked: the first ones, while depths are vague, say less of the lens
-  /// than their derivatives make them seem to.
+  /// Score tests from the observations since the last call. The first observations, while depths are uncertain, carry
+  /// less information about the lens than their derivatives suggest.
   [[nodiscard]] std::vector<GivenNumber> take_recent(const LocalizationFilter& filter);
 
  private:
@@ -39,11 +39,11 @@ class GivenTally {
     Eigen::VectorXd score;
     Eigen::MatrixXd information, score_cov;
   };
-  Said before_;  ///< When it was last asked.
+  Said before_;  ///< State at the last call.
   std::vector<GivenNumber> numbers_;
 };
 
-/// A change of a pose, by its right perturbation: the largest in σ is kept.
+/// Keeps the component of a pose change (right perturbation) that is the largest relative to its σ.
 void take_move(const Eigen::Vector<double, 6>& move, const Eigen::Matrix<double, 6, 6>& cov, GivenNumber& given);
 
 }  // namespace alidade

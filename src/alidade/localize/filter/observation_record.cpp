@@ -10,8 +10,8 @@
 namespace alidade {
 namespace {
 
-/// Distances that were only supposed share their error: as vague as given, hundreds of them together
-/// would say how large the world is.
+/// Distances that were merely assumed share their error: with their configured σ, hundreds of them together
+/// would determine the scale of the world.
 RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig& config) {
   constexpr double hardly_given = 5.0;
   const bool is_given =
@@ -21,8 +21,8 @@ RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig
   return range;
 }
 
-/// Of the points that are there at once, from their first observation to their last, so many that the work stays in
-/// proportion; known ones first, then those with the most observations. False where that leaves too few.
+/// Limits the number of points that coexist (from first to last observation) to `most`, to bound the run time;
+/// known points first, then those with the most observations. False if that leaves too few.
 [[nodiscard]] bool thin(std::span<const ObservationFrame> frames, double most, std::vector<SmootherPoint>& points) {
   struct Life {
     std::size_t point = 0, first = 0, last = 0, num = 0;
@@ -66,7 +66,7 @@ struct PlaceOfPoint {
   Eigen::Matrix3d cov;
 };
 
-/// Poses and observations of a problem, from its last frame to its first.
+/// Poses and observations of a smoothing problem, built from its last frame back to its first.
 class BackwardPath {
  public:
   BackwardPath(const Camera& camera, const LocalizeConfig& config, const LocalizationFilter& filter,
@@ -77,20 +77,20 @@ class BackwardPath {
       if (each.is_linear) places_[each.point.id] = {each.point.point_in_world, each.point.cov};
   }
 
-  /// The pose of a frame, and its observations in their order; `path` is the filter's. Whether its observations hold
-  /// it.
+  /// Adds the pose of a frame and its observations in their order; `path` is the filter's. Returns whether the
+  /// observations determine the pose.
   bool take(const ObservationFrame& frame, const PathStep& path);
 
-  /// All frames down to the first, and those before it that a target holds. The number of the last one taken.
+  /// Takes all frames down to `first_frame`, and earlier ones that the target determines. Index of the last one taken.
   std::size_t take_back(std::span<const ObservationFrame> frames, std::span<const PathStep> path,
                         std::size_t first_frame);
 
   std::vector<Rigid3> world_from_cam;                      ///< Last frame first.
-  std::vector<std::vector<UsedObservation>> observations;  ///< Frames counted from none.
+  std::vector<std::vector<UsedObservation>> observations;  ///< Their `frame` is not set yet.
 
  private:
-  void give_back();  ///< The frame taken last.
-  /// A given point may be further from the map's frame than its own σ: a filter that took it for mismatched lost it.
+  void give_back();  ///< Removes the frame taken last.
+  /// A given point may be off in the map's frame by more than its own σ, if a filter lost it as a mismatch.
   [[nodiscard]] static Eigen::Matrix3d cov_of(const LocalizationFilter& filter, const SmootherPoint& point) {
     const auto place = filter.place(point.id);
     return place ? place->cov : Eigen::Matrix3d::Zero().eval();
@@ -102,7 +102,7 @@ class BackwardPath {
   std::map<long, PlaceOfPoint> places_;
 };
 
-/// The filter's pose, that of the frame after it, and that moved on as between the two after it.
+/// Initial guesses: the filter's pose, that of the following frame, and that one extrapolated at constant velocity.
 std::vector<Rigid3> BackwardPath::begin_at(const PathStep& path) const {
   std::vector<Rigid3> begin;
   if (path.has_pose()) begin.push_back(path.world_from_cam);
@@ -125,7 +125,7 @@ bool BackwardPath::take(const ObservationFrame& frame, const PathStep& path) {
     used.push_back({0, observation.id, observation.px, sigma_px});
   }
   std::vector<Rigid3> begin = begin_at(path);
-  const double gate = 4.0 * config_.filter.gate;  // poses and positions give way when all are solved for together
+  const double gate = 4.0 * config_.filter.gate;  // wide: poses and positions still change in the joint solve
   auto found = resection(camera_, placed, begin, gate);
   constexpr double doubtful = 0.5;
   if (found && static_cast<double>(found->num_fit) < doubtful * static_cast<double>(placed.size())) {
@@ -162,10 +162,10 @@ void BackwardPath::give_back() {
   observations.pop_back();
 }
 
-/// A filter's unit grows while depths are vague. Where the supposed distances of the first points are the unit, the
-/// path begins at theirs: the scale that their inverses ask for, by least squares.
+/// A filter's unit of length grows while depths are uncertain. Where the assumed distances of the first points define
+/// the unit, rescales the path to them: least squares over the inverse distances.
 void rescale(SmootherProblem& problem) {
-  constexpr double is_unit = 1.0;  // the others' σ is five times the distance
+  constexpr double is_unit = 1.0;  // for all other assumed distances σ is five times the distance
   double products = 0.0, squares = 0.0;
   for (const SmootherPoint& point : problem.points) {
     if (!point.range || !(point.range->sigma_rel < is_unit)) continue;
@@ -180,7 +180,7 @@ void rescale(SmootherProblem& problem) {
   for (SmootherPoint& point : problem.points) point.point_in_world *= scale;
 }
 
-/// Times, poses and observations in their order. The points that are seen.
+/// Adds times, poses and observations in order of time. Returns the ids of the observed points.
 std::set<long> add_frames(const BackwardPath& back, std::span<const PathStep> path, const std::set<std::size_t>& jumps,
                           SmootherProblem& problem) {
   std::set<long> seen;
@@ -211,7 +211,7 @@ bool is_settled(const Feature& feature, const LocalizationFilter& filter, const 
 }
 
 double max_points_at_once(std::size_t num_frames) {
-  constexpr double max_work = 2e8;  // frames times the square of the components that are there at once: seconds
+  constexpr double max_work = 2e8;  // frames × (components at one time)²: a run time of seconds
   constexpr double num_shared = 24.0;
   return (std::sqrt(max_work / static_cast<double>(num_frames)) - num_shared) / 3.0;
 }
@@ -270,16 +270,16 @@ void ObservationRecord::add_gone(const LocalizeConfig& config, std::span<const G
   }
 }
 
-/// What holds the world: a start, a target, or the first camera.
+/// Sets what fixes the world frame: a start, a target, or the first camera.
 void ObservationRecord::give_frame(const LocalizeConfig& config, const std::optional<StartHypothesis>& start,
                                    SmootherProblem& problem) const {
   const bool has_target = !config.target.points.empty();
-  if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else the observations contradicted it
+  if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else contradicted by the observations
   if (config.start || has_target) return;
   problem.gauge = PathGauge::similarity;
   rescale(problem);
   if (!start || problem.start) return;
-  problem.start = start;  // however often the filter began again: one camera is the world
+  problem.start = start;  // even after restarts: the first camera defines the world frame
   problem.start->motion.world_from_cam = problem.world_from_cam.front();
 }
 

@@ -10,14 +10,14 @@
 
 namespace alidade {
 
-/// A point that left the map and is seen again long after: the path has drifted meanwhile, and it is a new point of the
-/// map, by a number of its own, until the loop is closed (loop_closure.h).
+/// A point that left the map and is observed again much later: the path has drifted meanwhile, so it becomes a new
+/// point of the map, with its own number, until the loop is closed (loop_closure.h).
 class PointEpisodes {
  public:
-  /// The number by which the map has an observed point. `has_left`: whether the one that the map had last is not in it.
+  /// The map's number of an observed point. `has_left`: whether the map no longer contains its last number.
   template <typename HasLeft>
   long id_of(long number, std::size_t frame, const HasLeft& has_left) {
-    constexpr std::size_t long_after = 100;  // frames: a gap so short costs little to bridge, and drifts little
+    constexpr std::size_t long_after = 100;  // frames: shorter gaps are cheap to bridge and drift little
     const auto [at, is_new] = now_.try_emplace(number, Episode{number, frame});
     Episode& episode = at->second;
     if (!is_new && frame > episode.last_frame + long_after && has_left(episode.id)) {
@@ -28,7 +28,7 @@ class PointEpisodes {
     return episode.id;
   }
 
-  /// Of those that have another than their own.
+  /// Map number → own number, for those that differ.
   [[nodiscard]] const std::map<long, long>& number_of() const { return number_of_; }
   [[nodiscard]] long number(long id) const {
     const auto at = number_of_.find(id);
@@ -45,8 +45,8 @@ class PointEpisodes {
   long next_ = std::numeric_limits<long>::min();
 };
 
-/// A map by its points' own numbers: of each the one that is known best, those that were solved for first. `solved`:
-/// their ids, growing.
+/// Renames the points of a map to their own numbers; among duplicates, keeps the one with the smallest σ, preferring
+/// points that were solved for. `solved`: their ids, ascending.
 void join_episodes(const PointEpisodes& episodes, std::span<const long> solved, std::vector<MapPoint>& map);
 
 }  // namespace alidade

@@ -41,7 +41,7 @@ std::size_t PointStore::num_used(long id) const {
   return at == points_.end() ? 0 : at->second.num_used;
 }
 
-/// Where nothing is known of a point: as deep as the points of the map, their median.
+/// Default depth of an unknown point: the median depth of the points of the map.
 double PointStore::usual_depth_m(const LocalizationFilter& filter) const {
   if (config_->depth_m) return *config_->depth_m;
   std::vector<double> depths;
@@ -49,19 +49,19 @@ double PointStore::usual_depth_m(const LocalizationFilter& filter) const {
     const double depth = (filter.motion().world_from_cam.inverse() * place_of(feature).point_in_world).z();
     if (depth > 0.0 && (feature.is_known || config_->target.points.empty())) depths.push_back(depth);
   }
-  if (depths.empty()) return 1.0;  // a world without scale: its first points are one unit away
+  if (depths.empty()) return 1.0;  // world of unknown scale: the first points are one unit away
   return median_of(std::move(depths));
 }
 
-/// Null where none is given.
+/// Null if no depth is given for it.
 const GivenDepth* PointStore::given_depth(long id) const {
   if (!config_->start) return nullptr;
   const auto at = std::ranges::find(config_->start->depths, id, &GivenDepth::id);
   return at == config_->start->depths.end() ? nullptr : &*at;
 }
 
-/// Of a point that was in the map: as far as it was, as sure as it and the camera are. Never surer than 5 %: the pose
-/// is correlated with what the point said before. None: never there, or now behind.
+/// Range of a point that was in the map, from its last position; σ from those of the point and the camera, at least 5 %
+/// because the pose is correlated with the point's earlier observations. Empty: never in the map, or behind the camera.
 std::optional<RangePrior> PointStore::known_range(long id, const LocalizationFilter& filter) const {
   const auto at = gone_.find(id);
   if (at == gone_.end()) return std::nullopt;
@@ -81,7 +81,7 @@ std::optional<RangePrior> PointStore::prior_of(const FeatureObservation& observa
   if (config_->new_points == NewPoints::delayed) return triangulated(observation, filter);
   const auto ray_in_cam = unproject(filter.camera(), observation.px);
   if (!ray_in_cam) return std::nullopt;
-  const double min_z = 0.05;  // a fisheye sees sideways, too: there a depth is no distance
+  const double min_z = 0.05;  // a fisheye also sees sideways, where a depth does not give a distance
   const double z = std::max(ray_in_cam->z(), min_z);
   const GivenDepth* const given = given_depth(observation.id);
   const bool is_new = !std::exchange(points_[observation.id].was_in_map, true);
@@ -89,7 +89,7 @@ std::optional<RangePrior> PointStore::prior_of(const FeatureObservation& observa
   return RangePrior{usual_depth_m(filter) / z, config_->sigma_depth, !config_->depth_m};
 }
 
-/// From the ray of its first observation and this one: d = b sin α₁ / sin(parallax), σ_d/d of the parallax' own σ.
+/// From the rays of the first observation and this one: d = b sin α₁ / sin(parallax), σ_d/d from the σ of the parallax.
 std::optional<RangePrior> PointStore::triangulated(const FeatureObservation& observation,
                                                    const LocalizationFilter& filter) {
   const auto ray_in_cam = unproject(filter.camera(), observation.px);
@@ -106,12 +106,12 @@ std::optional<RangePrior> PointStore::triangulated(const FeatureObservation& obs
   const double sine = point.first_ray_in_world.cross(ray_in_world).norm();
   const double range_m = baseline.cross(point.first_ray_in_world).norm() / std::max(sine, 1e-12);
   const double focal_px = params(filter.camera().lens)[0];
-  // Two pixels, each with as much again for what the pose may have gone wrong between them.
+  // Two pixels, with the variance of each doubled for the pose error accumulated between them.
   const double sigma_angle = 2.0 * std::sqrt(2.0) * filter.config().sigma_px / focal_px;
   const double sigma_rel = sigma_angle / std::max(sine, 1e-12);
   constexpr double sure_enough = 0.05;
   if (!(sigma_rel < sure_enough) || !(range_m > 0.0)) return std::nullopt;
-  return RangePrior{range_m, sure_enough, true};  // the rays are correlated with the pose: never surer than that
+  return RangePrior{range_m, sure_enough, true};  // not below it: the rays are correlated with the pose
 }
 
 }  // namespace alidade

@@ -31,7 +31,7 @@ void StateCovariance::reserve(int state_capacity, int measured_capacity) {
   dim_ = pending_ = pending_aside_ = 0;
 }
 
-/// But for what is set aside, which is of an update that is not over.
+/// Copies all but the change set aside, which belongs to an unfinished update.
 StateCovariance& StateCovariance::operator=(const StateCovariance& other) {
   if (this == &other) return *this;
   if (stride_ != other.stride_ || pending_capacity_ != other.pending_capacity_)
@@ -77,7 +77,7 @@ void StateCovariance::remove(int offset, int count) {
   for (int j = offset; j + count < dim_; ++j) std::memcpy(&at(0, j), &at(0, j + count), stride() * sizeof(double));
   dim_ -= count;
   const int padded = std::min(rounded_up(dim_ + count), stride_);
-  for (int j = 0; j < padded; ++j)  // the last panel is read as a whole
+  for (int j = 0; j < padded; ++j)  // the last panel is always read as a whole
     for (int i = j < dim_ ? dim_ : 0; i < padded; ++i) at(i, j) = 0.0;
 }
 
@@ -93,7 +93,7 @@ void StateCovariance::product(const Rows& rows, double* x0, double* x1) const {
 
 void StateCovariance::products(std::span<const Rows> rows) {
   const int num = 2 * static_cast<int>(rows.size()), tiles = (num + 3) / 4;
-  // H W, four measured components together, for each column of W.
+  // H W, four measured components at a time, for each column of W.
   for (std::size_t m = 0; m < rows.size(); ++m) {
     for (int k = 0; k < pending_; ++k) {
       double sum0 = 0.0, sum1 = 0.0;
@@ -127,7 +127,7 @@ Eigen::Matrix2d StateCovariance::innovation_covariance(const Rows& rows) const {
   for (std::size_t a = 0; a < rows.columns.size(); ++a) {
     const double* column = &P_[static_cast<std::size_t>(rows.columns[a]) * stride()];
     const double h0 = rows.h0[a], h1 = rows.h1[a], own = column[rows.columns[a]];
-    double x0 = 0.5 * own * h0, x1 = 0.5 * own * h1;  // H P Hᵀ is twice what stands below the diagonal
+    double x0 = 0.5 * own * h0, x1 = 0.5 * own * h1;  // H P Hᵀ is twice the part below the diagonal
     for (std::size_t b = 0; b < a; ++b) {
       x0 += rows.h0[b] * column[rows.columns[b]];
       x1 += rows.h1[b] * column[rows.columns[b]];
@@ -167,7 +167,7 @@ bool StateCovariance::stays_positive() const {
 }
 
 void StateCovariance::commit() {
-  constexpr int together = 4;  // panels that stay in the nearest cache while every other passes by
+  constexpr int together = 4;  // panels that stay in the L1 cache while all others stream past
   for (int first = 0; first < num_panels(); first += together) {
     const int end = std::min(first + together, num_panels());
     for (int p = first; p < num_panels(); ++p) {
@@ -184,7 +184,7 @@ void StateCovariance::commit() {
   pending_ = 0;
 }
 
-/// Below the diagonal first, then its mirror: rows of a matrix that stands column by column are slow to write.
+/// Computes the lower triangle and mirrors it: writing rows of a column-major matrix is slow.
 void StateCovariance::turn(const double* blocks, int single_at, int num_single) {
   const auto is_single = [&](int i) { return i >= single_at && i < single_at + num_single; };
   for (int j = 0; j < dim_; j += is_single(j) ? 1 : 3) {

@@ -5,7 +5,7 @@
 namespace alidade {
 namespace {
 
-/// How the angles of a direction change as the world rotates.
+/// Derivative of the angles of a direction with respect to a rotation of the world.
 Eigen::Matrix<double, 2, 3> J_angles_turn(const BearingAngles& bearing) {
   Eigen::Matrix<double, 2, 3> J;
   J.row(0) = bearing.m.cross(bearing.m_theta).transpose() / bearing.m_theta.squaredNorm();

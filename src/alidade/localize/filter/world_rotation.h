@@ -5,21 +5,21 @@
 
 #include "alidade/localize/filter/feature.h"
 
-// No measurement but that of known points determines how the world is rotated about its origin: camera, speed and map
-// may rotate together. An EKF, linearised at its changing estimate, loses that: the unobservable direction differs from
-// one update to the next, and so it gains information that no measurement gave (S. J. Julier & J.
-// K. Uhlmann, "A Counter Example to the Theory of SLAM", ICRA 2001). So errors are counted as in the right-invariant
+// Without known points the rotation of the world about its origin is unobservable: camera, velocity and map may all
+// rotate together. An EKF, linearised at its changing estimate, violates that: the unobservable direction differs from
+// one update to the next, and so it gains spurious information (S. J. Julier & J.
+// K. Uhlmann, "A Counter Example to the Theory of SLAM", ICRA 2001). So errors are defined as in the right-invariant
 // filter (A. Barrau & S. Bonnabel, "An EKF-SLAM Algorithm with Consistency Properties", 2015): with the rotation ξ = R̂
 // δθ of the world, G = exp(ξ), and the error δ of a position p̂,
-//     p = G (p̂ + δ + p̂ × ξ)        for the camera, its velocity, points, and where inverse depths begin,
-// which to first order is p̂ + δ. What is seen is a function of the bracket alone: the position before the world
-// rotates. Once the state has moved to p̂′ = Ĝ (…), errors are counted from there: with J the left Jacobian of ξ̂ and the
-// new ε_ξ = J ξ, δ′ = Ĝ (δ + p̂ × ξ) − p̂′ × ε_ξ.
+//     p = G (p̂ + δ + p̂ × ξ)        for the camera, its velocity, points, and anchors of inverse depths,
+// which to first order is p̂ + δ. Observations are functions of the bracket only: the position before the world
+// rotates. Once the state has moved to p̂′ = Ĝ (…), errors are re-referenced to it: with J the left Jacobian of ξ̂ and
+// the new ε_ξ = J ξ, δ′ = Ĝ (δ + p̂ × ξ) − p̂′ × ε_ξ.
 //
-// That is linear for small rotations only: by a large one, as at a start or after a gap, a camera that rotates in place
-// would have to move by ½ ξ² p̂. Such an update moves positions by δ alone, and holds the frame by its derivatives:
-// those by the rotation are less by what the rotation makes of p̂′ − p̂, so that they fit the covariance, which counts
-// errors from p̂.
+// This is linear for small rotations only: with a large one, as at a start or after a gap, a camera that rotates in
+// place would have to move by ½ ξ² p̂. Such an update moves positions by δ only, and preserves the frame through its
+// Jacobians: those with respect to the rotation are corrected by the effect of the rotation on p̂′ − p̂, so that they
+// match the covariance, whose errors refer to p̂.
 
 namespace alidade {
 
@@ -32,8 +32,8 @@ class WorldRotation {
   [[nodiscard]] Eigen::Vector3d position_before(const Eigen::Vector3d& place, const Eigen::Vector3d& error) const {
     return place + error + place.cross(xi_);
   }
-  /// A feature with its error (dim() components), before the world rotates; with its J_before_rotation(), where that is
-  /// at hand.
+  /// A feature with its error (dim() components), before the world rotates; the second overload takes its
+  /// J_before_rotation(), if already computed.
   [[nodiscard]] Feature feature_before(const Feature& feature, std::span<const double> error) const;
   [[nodiscard]] Feature feature_before(const Feature& feature, std::span<const double> error,
                                        const Eigen::Matrix<double, 6, 3>& J_before) const;
@@ -41,9 +41,9 @@ class WorldRotation {
   [[nodiscard]] const Eigen::Vector3d& xi() const { return xi_; }
 
   [[nodiscard]] Eigen::Matrix3d G() const;
-  /// A feature, as feature_before() gives it, rotated.
+  /// Rotates a feature as returned by feature_before().
   [[nodiscard]] static Feature turned(const Eigen::Matrix3d& G, const Feature& before);
-  /// Of an inverse depth: derivative of θ, φ, ρ after the rotation by those of feature_before().
+  /// For an inverse depth: derivative of θ, φ, ρ after the rotation with respect to those of feature_before().
   [[nodiscard]] static Eigen::Matrix3d J_rotated_angles(const Eigen::Matrix3d& G, const Feature& before);
 
  private:
@@ -51,7 +51,7 @@ class WorldRotation {
   Eigen::Vector3d xi_;
 };
 
-/// Derivative of feature_before() by ξ: [p̂]×, and minus what a rotation does to the angles. The first dim() rows.
+/// Derivative of feature_before() by ξ: [p̂]×, and minus the effect of a rotation on the angles; the first dim() rows.
 [[nodiscard]] Eigen::Matrix<double, 6, 3> J_before_rotation(const Feature& feature);
 
 }  // namespace alidade

@@ -9,17 +9,17 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a calibration, its printed lines, and camera.yaml, corners.csv, poses.csv and board_points.csv
-/// where there is a camera.
+/// Result document and printed lines of a calibration; if there is a camera, also camera.yaml, corners.csv, poses.csv
+/// and board_points.csv.
 [[nodiscard]] JobOutcome outcome_of(const Calibration& calibration);
 
-/// The document of corners, its lines, and corners.csv where there are any.
+/// Result document and printed lines of detected corners, and corners.csv if there are any.
 [[nodiscard]] JobOutcome outcome_of(const FoundCorners& found);
 
-/// Adds what became of the photos' files: the inputs, other files beside the photos, and their orientation.
+/// Adds the files of the photos: the inputs, other files beside the photos, and the photos' orientation.
 void add_photos(const PhotoSet& set, JobOutcome& outcome);
 
-/// Adds small images of the photos for the report, and the worst one without its distortion.
+/// Adds small images of the photos for the report, and the worst photo undistorted.
 void add_images(const Calibration& calibration, const Photos& photos, JobOutcome& outcome);
 
 ALIDADE_PUBLIC_END

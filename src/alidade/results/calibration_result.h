@@ -8,8 +8,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Reads what later commands need of the folder of a calibration (or the result.json in it). Throws InputError: not a
-/// calibration, a refused one, files missing.
+/// Reads what later commands need from the folder of a calibration (or its result.json). Throws InputError if it is not
+/// a calibration, was refused, or lacks files.
 [[nodiscard]] CalibratedNow read_calibration(const std::filesystem::path& result);
 
 ALIDADE_PUBLIC_END

@@ -7,7 +7,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of an identification, its printed lines, and servo.yaml where there is a plant.
+/// Result document and printed lines of an identification, and servo.yaml if there is a plant.
 [[nodiscard]] JobOutcome outcome_of(const Identification& identification);
 
 ALIDADE_PUBLIC_END

@@ -9,11 +9,11 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a path, its printed lines, and where there is an estimate trajectory.tum, poses.csv, map.csv,
-/// map.ply, map.yaml and, of a lens that was estimated, camera.yaml.
+/// Result document and printed lines of a localized path; if there is an estimate, also trajectory.tum, poses.csv,
+/// map.csv, map.ply, map.yaml and, if a lens was estimated, camera.yaml.
 [[nodiscard]] JobOutcome outcome_of(const Localization& localization);
 
-/// One row of the table `path`: what is shown while a run goes on.
+/// One row of the table `path`, as shown during a run.
 [[nodiscard]] DataTable localize_row(const PathStep& step, std::span<const TimedPose> truth);
 
 ALIDADE_PUBLIC_END

@@ -7,7 +7,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a plan of moves, and a line per move.
+/// Result document of a plan of moves, and one printed line per move.
 [[nodiscard]] JobOutcome outcome_of(const MovePlan& plan);
 
 ALIDADE_PUBLIC_END

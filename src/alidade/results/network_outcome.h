@@ -7,8 +7,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of cameras located by a moving target, its printed lines, and, where they are located, rig.yaml with
-/// a camera_ID.yaml for each head, events.csv (on one clock, for `track`) and path.csv.
+/// Result document and printed lines of cameras located by a moving target; if they are located, also rig.yaml with a
+/// camera_ID.yaml for each head, events.csv (on one clock, for `track`) and path.csv.
 [[nodiscard]] JobOutcome outcome_of(const NetworkCalibration& calibration);
 
 ALIDADE_PUBLIC_END

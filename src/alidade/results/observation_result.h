@@ -8,9 +8,9 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Reads what `plan observe` needs of the folder (or result.json) of an `alidade observe`: the camera, its covariance,
-/// the noise, and where the points were last seen. Throws InputError: not an observation, or a refused one that leaves
-/// no camera.
+/// Reads what `plan observe` needs from the folder of an `alidade observe` (or its result.json): the camera, its
+/// covariance, the noise, and the last observed positions of the points. Throws InputError if it is not an observation,
+/// or was refused without a camera.
 [[nodiscard]] ObservedNow read_observation(const std::filesystem::path& result);
 
 ALIDADE_PUBLIC_END

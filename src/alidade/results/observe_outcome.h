@@ -9,13 +9,13 @@ namespace alidade {
 struct VideoLog;
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of an observation, its printed lines, camera.yaml where there is a camera, intrinsics.csv with it, and
-/// pairs.csv where photos were matched.
+/// Result document and printed lines of an observation; if there is a camera, also camera.yaml and intrinsics.csv; if
+/// photos were matched, also pairs.csv.
 [[nodiscard]] JobOutcome outcome_of(const ObserveReport& report);
 
 ALIDADE_PUBLIC_END
 
-/// The log that a video gave: points.csv, to be looked at and used again, and a line about it.
+/// Adds the log made from a video as points.csv, for inspection and reuse, and a line about it.
 void add_video(const VideoLog& video, JobOutcome& outcome);
 
 }  // namespace alidade

@@ -12,27 +12,27 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A file beside result.json, or an image (JPEG) of the report.
+/// A file next to result.json, or an image (JPEG) of the report.
 struct NamedBytes {
   std::string name;
   std::string bytes;
 };
 
-/// Everything that a job produces: what a command shows and writes, and what a program saves.
+/// Everything that a job produces: what a command prints and writes, and what a program saves.
 struct JobOutcome {
-  ResultDocument document;         ///< Of it counts, assumed, verdict, estimate … grids; the rest is the run's.
+  ResultDocument document;         ///< Only counts, assumed, verdict, estimate … grids; the run sets the rest.
   std::vector<std::string> lines;  ///< For display, before the verdict.
   std::vector<NamedBytes> files;
-  std::vector<NamedBytes> images;  ///< The most wanted first.
+  std::vector<NamedBytes> images;  ///< The most important first.
 };
 
-/// These files of the outcome say, where its verdict is not good, that it is not, and what is in no σ of them.
+/// If the verdict is not good, appends a note to these files that says so, and which errors σ does not include.
 void note_verdict(std::initializer_list<std::string_view> files, JobOutcome& outcome, const std::string& cause = "");
 
-/// "KIND: WHAT", a line for each; of many the first ten, and how many more result.json names.
+/// One line "KIND: WHAT" for each; of more than ten the first ten, and how many more result.json names.
 void add_each(std::string_view kind, std::span<const std::string> each, std::vector<std::string>& lines);
 
-/// Rows of the job's file that were wrong and not read: counted as given, and named.
+/// Adds wrong rows of the job's input file that were not read: they count as given, and are listed.
 inline void add_skipped(const std::vector<SkippedInput>& skipped, JobOutcome& outcome) {
   add_skipped(skipped, outcome.document.counts);
 }

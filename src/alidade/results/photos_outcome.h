@@ -7,7 +7,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of the photos to take next, and a line for each.
+/// Result document of the photos to take next, and one printed line per photo.
 [[nodiscard]] JobOutcome outcome_of(const PhotoPlan& plan);
 
 ALIDADE_PUBLIC_END

@@ -9,11 +9,11 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a rangefinder, its printed lines, and rangefinder.yaml and camera.yaml where there is a beam.
-/// `camera_file`: what the camera was read from, to be named in that file.
+/// Result document and printed lines of a rangefinder; if there is a beam, also rangefinder.yaml and camera.yaml.
+/// `camera_file`: the file of the camera, to be named in rangefinder.yaml.
 [[nodiscard]] JobOutcome outcome_of(const RangefinderCalibration& calibration, const std::string& camera_file = "");
 
-/// The same of a direction by edges.
+/// The same for a direction estimated from edges.
 [[nodiscard]] JobOutcome outcome_of(const EdgesCalibration& calibration);
 
 /// Adds small images of the shots' photos for the report.

@@ -8,8 +8,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What `plan rangefinder` needs of the folder (or result.json) of a calibrated rangefinder. Throws InputError: not
-/// such a result, or a refused one that leaves no beam.
+/// Reads what `plan rangefinder` needs from the folder of a calibrated rangefinder (or its result.json). Throws
+/// InputError if it is not such a result, or was refused without a beam.
 [[nodiscard]] BeamNow read_rangefinder(const std::filesystem::path& result);
 
 ALIDADE_PUBLIC_END

@@ -7,8 +7,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a rig, its printed lines, and rig.yaml with a camera_ID.yaml for each head where there is a
-/// rig.
+/// Result document and printed lines of a rig calibration; if there is a rig, also rig.yaml with a camera_ID.yaml for
+/// each head.
 [[nodiscard]] JobOutcome outcome_of(const RigCalibration& calibration);
 
 ALIDADE_PUBLIC_END

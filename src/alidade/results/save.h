@@ -8,8 +8,8 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Leaves in `folder` what the command leaves there: result.json, the files of the estimate, report.html; all of them
-/// at once, or none. Throws InputError where they cannot be written. `save(outcome_of(calibration), "result")`.
+/// Writes to `folder` what the command writes there: result.json, the files of the estimate, report.html; all of them
+/// or none. Throws InputError if they cannot be written. `save(outcome_of(calibration), "result")`.
 void save(JobOutcome outcome, const std::filesystem::path& folder);
 
 ALIDADE_PUBLIC_END

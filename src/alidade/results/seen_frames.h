@@ -12,17 +12,17 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Some images of a run, evenly spread over it, with what was looked for in them: for its page.
+/// Some images of a run, evenly spread over it, with the features searched for in them: for the report.
 class SeenFrames {
  public:
-  /// `num_images` of the run; 0: not known. Without a page no image is kept, only what was looked for.
+  /// `num_images` in the run; 0: not known. Without `keeps_images` only the searches are stored, not the images.
   SeenFrames(std::size_t num_images, bool keeps_images);
 
   /// For LocalizeConfig::watch_image.
   void offer(double t_s, const cv::Mat& image, std::span<const ObservationTried> tried);
-  /// Puts the tables `frames` (t_s, name of the image, its size) and `observations` (where a point was expected, the
-  /// covariance of the innovation, where it was found) before the others, and adds the images; nothing where no image
-  /// came.
+  /// Inserts the tables `frames` (t_s, name of the image, its size) and `observations` (expected pixel of a point,
+  /// covariance of the innovation, detected pixel) before the others, and adds the images. It does nothing if no image
+  /// was offered.
   void add_to(JobOutcome& outcome) const;
   [[nodiscard]] std::size_t num_images() const { return images_.size(); }
 
@@ -31,7 +31,7 @@ class SeenFrames {
   struct Frame {
     double t_s;
     std::string name;
-    int width_px, height_px;  ///< Of the image in which pixels are counted; the JPEG may be smaller.
+    int width_px, height_px;  ///< Of the image that the pixels refer to; the JPEG may be smaller.
     std::vector<ObservationTried> tried;
   };
   std::size_t count_ = 0, every_ = 1;

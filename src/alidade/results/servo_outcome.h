@@ -9,11 +9,11 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a servo study (the tables `control`, `steps`, `measurements`, `trials`, `loops` and `lenses`, the
-/// grid `robustness`), its printed lines, and servo.csv where anything ran.
+/// Result document of a servo study (the tables `control`, `steps`, `measurements`, `trials`, `loops` and `lenses`, the
+/// grid `robustness`), its printed lines, and servo.csv if anything ran.
 [[nodiscard]] JobOutcome outcome_of(const ServoResult& result);
 
-/// One row of `control`.
+/// One row of the table `control`.
 [[nodiscard]] DataTable servo_row(std::span<const RigHead> heads, const ServoRow& row);
 
 ALIDADE_PUBLIC_END

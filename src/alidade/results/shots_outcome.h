@@ -7,7 +7,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of the shots to take next, and a line for each.
+/// Result document of the shots to take next, and one printed line per shot.
 [[nodiscard]] JobOutcome outcome_of(const ShotPlan& plan);
 
 ALIDADE_PUBLIC_END

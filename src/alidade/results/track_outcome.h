@@ -8,13 +8,13 @@ namespace alidade {
 struct TargetFrame;
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a track, its printed lines, and track.csv and smoothed.csv where there is one.
+/// Result document and printed lines of a track; if there is one, also track.csv and smoothed.csv.
 [[nodiscard]] JobOutcome outcome_of(const TargetTrack& track);
 
 ALIDADE_PUBLIC_END
 
-/// The same of observations that were found in videos: with each video's figures, the table `frames` and events.csv.
-/// Where the target is in no frame, that is the verdict.
+/// The same for observations detected in videos: adds each video's figures, the table `frames` and events.csv. If no
+/// frame shows the target, the verdict says so.
 [[nodiscard]] JobOutcome outcome_of(const TargetTrack& track, const std::vector<TargetFrame>& frames);
 
 }  // namespace alidade

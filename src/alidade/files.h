@@ -38,5 +38,5 @@
 #include "alidade/tables/shots_file.h"
 #include "alidade/tables/views_file.h"
 
-/// Files in and out: photos, cameras of OpenCV, ROS, Kalibr, mrcal, COLMAP and ours, beams, rigs; tables of corners,
-/// shots, scans, views, targets and matches; rotation logs; results.
+/// Reading and writing of files: photos; cameras of OpenCV, ROS, Kalibr, mrcal, COLMAP and alidade; beams, rigs; tables
+/// of corners, shots, scans, views, targets and matches; rotation logs; results.

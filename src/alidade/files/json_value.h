@@ -14,14 +14,14 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A JSON value composed of plain C++ values: `value["camera"]["fx"] = 532.8`. Objects keep the order of insertion.
+/// A JSON value built from plain C++ values: `value["camera"]["fx"] = 532.8`. Objects keep the order of insertion.
 /// Numbers that are not finite become null in the text.
 class JsonValue {
  public:
   using Member = std::pair<std::string, JsonValue>;
   using List = std::vector<JsonValue>;
-  /// A separate type, no alias: libstdc++ 12 takes a variant of its own types for one that always holds a value, and
-  /// if a copy runs out of memory it would destroy an object that was never constructed.
+  /// A separate type: libstdc++ 12 treats a variant of its own types as one that always holds a value, and if a copy
+  /// runs out of memory it would destroy an object that was never constructed.
   struct Object : std::vector<Member> {
     using std::vector<Member>::vector;
   };
@@ -49,7 +49,7 @@ class JsonValue {
   [[nodiscard]] static JsonValue object();
   [[nodiscard]] static JsonValue list() { return JsonValue(List{}); }
 
-  /// The member with that name; created if missing. A null becomes an object.
+  /// The member with that name, which is created if it does not exist. A null becomes an object.
   JsonValue& operator[](std::string_view key);
   /// Appends to a list. A null becomes a list.
   void push_back(JsonValue value);
@@ -62,10 +62,10 @@ class JsonValue {
   Content content_ = nullptr;
 };
 
-/// In a column, for a row without a value: null in a document.
+/// The value in a column for a row without a value; it becomes null in a document.
 inline constexpr double missing_value = std::numeric_limits<double>::quiet_NaN();
 
-/// The numbers rounded to `decimals` decimals: as many as are useful to a reader, for a reasonable file size.
+/// The numbers rounded to `decimals` decimals: what a reader can use, in a file of reasonable size.
 [[nodiscard]] std::vector<double> rounded(std::vector<double> numbers, int decimals);
 
 ALIDADE_PUBLIC_END

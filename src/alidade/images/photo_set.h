@@ -14,26 +14,26 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The photos of files and folders. Each is read once; the second look comes from memory while the set is small. They
-/// may be loaded from many threads; copies share what was read.
+/// The photos of files and folders. Each is read once; while the set is small, later loads come from memory. Photos may
+/// be loaded from many threads; copies share what was read.
 class PhotoSet {
  public:
-  /// Throws InputError where one of the paths does not exist, or is a folder without photos.
+  /// Throws InputError if one of the paths does not exist, or is a folder without photos.
   explicit PhotoSet(const std::vector<std::filesystem::path>& paths);
 
-  /// As input of a job: by file name, or by path where two files have the same name.
+  /// The input of a job: photos by file name, or by path if two files have the same name.
   [[nodiscard]] Photos photos() const;
   [[nodiscard]] std::size_t size() const;
-  /// Those that were read, in their order: name, size, checksum.
+  /// The photos that were read, in order: name, size, checksum.
   [[nodiscard]] std::vector<InputFile> inputs() const;
-  /// Files beside the photos that are no photos.
+  /// Files beside the photos that are not photos.
   [[nodiscard]] const std::vector<SkippedInput>& skipped() const;
-  /// The same in a line for a user; "" for none.
+  /// The skipped files in one line for the user; "" if there are none.
   [[nodiscard]] std::string skipped_line() const;
-  /// Names the photos that a viewer would rotate differently from most of them, and says that they were not rotated.
-  /// None where all stand alike.
+  /// Lists photos whose EXIF orientation differs from that of most, or states one that all share if it is not upright;
+  /// pixels are used as stored. None if all are upright.
   [[nodiscard]] std::optional<Check> turned() const;
-  /// Throws InputError, about the first, where none of them could be read; `reason`: why that one.
+  /// Throws InputError about the first photo if no photo could be read; `reason` says why that one could not.
   void require_readable(std::size_t num_unreadable, const std::string& reason) const;
 
  private:

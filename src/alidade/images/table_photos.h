@@ -13,15 +13,15 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The photos that a table names, relative to its folder. May be loaded from many threads; copies share what was read.
+/// The photos that a table names, relative to its folder. Many threads may load them; copies share what was read.
 class TablePhotos {
  public:
-  /// Of the table of that name. `roles`: what photos are, by name, that are no "photo".
+  /// `table` is the table's file. `roles`: the roles, by name, of photos that are not a "photo".
   explicit TablePhotos(const std::filesystem::path& table, std::map<std::string, std::string> roles = {});
 
-  /// What it gives throws InputError where a photo cannot be read.
+  /// Loads a photo by its name; throws InputError if it cannot be read.
   [[nodiscard]] PhotoByName loader() const;
-  /// Those that were read: role, name, size, checksum.
+  /// The photos that were read: role, name, size, checksum.
   [[nodiscard]] std::vector<InputFile> inputs() const;
 
  private:

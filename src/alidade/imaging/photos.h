@@ -14,14 +14,14 @@ class Mat;
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Gives photo `i`; called from several threads, each photo once. What it throws becomes that photo's reason.
+/// Returns photo `i`; called from several threads, once per photo. An exception becomes the reason given for it.
 using PhotoLoader = std::function<cv::Mat(std::size_t i)>;
 
-/// Gives the photo of that name, as a table has it; called from several threads. What it throws becomes the reason of
-/// the row that names it.
+/// Returns the photo with that name, as a table gives it; called from several threads. An exception becomes the reason
+/// given for the row that names the photo.
 using PhotoByName = std::function<cv::Mat(const std::string& name)>;
 
-/// Photos by name, each loaded when it is needed.
+/// Photos by name, each loaded when needed.
 struct Photos {
   std::vector<std::string> names;
   PhotoLoader load;

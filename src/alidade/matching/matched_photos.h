@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Two features matched as the same point: their indices in the lists of their photos.
+/// Two features matched as the same point: their indices in the feature lists of their photos.
 struct FeatureMatch {
   int a = 0, b = 0;
 };
@@ -19,7 +19,7 @@ struct MatchedPair {
   std::vector<FeatureMatch> matches;
 };
 
-/// Points of photos of one size, and which of them are matched. Any number of the matches may be wrong.
+/// Features of photos of one size, and matches between them. Any number of the matches may be wrong.
 struct MatchedPhotos {
   int width_px = 0, height_px = 0;                     ///< Of all photos that have features.
   std::vector<std::string> names;                      ///< One per photo.

@@ -12,16 +12,16 @@ ALIDADE_PUBLIC_BEGIN
 
 enum class PathKind { still, circle, sway, step, manoeuvre, recorded };
 [[nodiscard]] std::string_view path_name(PathKind kind);  ///< still, circle, sway, step, manoeuvre, recorded
-/// All but `recorded`, which needs its record.
+/// The kind with that name; all but `recorded`, which needs its record.
 [[nodiscard]] std::optional<PathKind> path_named(std::string_view name);
 
-/// Where a target goes. A circle lies in a plane of constant z and begins at `start`, its centre at −x of it; a sway is
-/// sideways about `start`; a step leaves `start` for good at a time; the manoeuvre is manoeuvre_position(); a recorded
-/// path goes through its positions by cubics (Hermite's, with the slopes of parabolas) and is static before and
-/// after.
+/// Path of a target. A circle lies in a plane of constant z and begins at `start`, with its centre at −x of it; a sway
+/// is a lateral oscillation about `start`; a step leaves `start` for good at a given time; a manoeuvre is
+/// manoeuvre_position(); a recorded path interpolates its positions by cubics (Hermite's, with the slopes of parabolas)
+/// and is constant before and after.
 struct TargetPath {
   PathKind kind = PathKind::circle;
-  Eigen::Vector3d start_m{0.173, -0.314, 0.636};  ///< In the world: the start of Xiahou, Chen & Wu, 2015.
+  Eigen::Vector3d start_m{0.173, -0.314, 0.636};  ///< In the world: the initial position of Xiahou, Chen & Wu, 2015.
   double radius_m = 0.1;                          ///< Also the amplitude of a sway.
   double period_s = 10.0;
   Eigen::Vector3d jump_m{0.25, 0.12, 0.0};
@@ -32,8 +32,8 @@ struct TargetPath {
   [[nodiscard]] Eigen::Vector3d at(double t_s) const;
 };
 
-/// Focal lengths over time, as factors on a camera's own: straight in the logarithm between the times, still before and
-/// after. Without times they stand.
+/// Focal lengths over time, as factors of a camera's own: linear in the logarithm between the times, constant before
+/// the first and after the last. Without times the factor is constant.
 struct ZoomProfile {
   std::vector<double> t_s;  ///< Ascending.
   std::vector<double> factor;

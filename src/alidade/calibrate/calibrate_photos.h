@@ -8,18 +8,18 @@
 
 namespace alidade {
 
-/// The way from photos to a camera: what was found in each, and the calibration.
+/// From photos to a camera: the detections in each photo, and the calibration.
 struct PhotoCalibration {
-  std::vector<BoardView> views;      ///< One per photo, after the second extraction; no corners where none was found.
-  std::vector<std::string> reasons;  ///< One per photo: why it has no corners; empty where it has.
-  ImageSize size;                    ///< That most photos have; 0×0 where none could be read.
+  std::vector<BoardView> views;  ///< One per photo, after the second extraction; without corners if none were found.
+  std::vector<std::string> reasons;  ///< One per photo: why it has no corners; empty if it has.
+  ImageSize size;                    ///< Size of most photos; 0×0 if none could be read.
   std::size_t num_unreadable = 0;
-  CalibrateReport report;  ///< Of `views`.
+  CalibrateReport report;  ///< From `views`.
 };
 
-/// Bouguet's procedure: find the corners, calibrate a flat board, extract the corners again with lens and pose known,
-/// calibrate as `config` asks. Photos of another size than most are rejected and named. Where
-/// (nearly) none shows the board as given, the board that they do show is searched, and the report says how to give
+/// Bouguet's procedure: detect the corners, calibrate with a flat board, extract the corners again with lens and pose
+/// known, calibrate as `config` asks. Photos of another size than most are rejected and named. If
+/// (nearly) none shows the given board, the board that they do show is searched for, and the report says how to specify
 /// it. J.-Y. Bouguet, "Camera calibration toolbox for Matlab", first example: analyse error, reproject, recompute
 /// corners.
 [[nodiscard]] PhotoCalibration calibrate_photos(const std::vector<std::string>& names, const PhotoLoader& load_photo,

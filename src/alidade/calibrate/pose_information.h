@@ -11,17 +11,17 @@
 
 namespace alidade {
 
-/// Positions of the parameters of a lens that are estimated: those with a variance.
+/// Indices of the estimated parameters of a lens: those with a variance.
 [[nodiscard]] std::vector<int> free_parameters(const Camera& camera);
 
 /// Rows and columns of a matrix.
 [[nodiscard]] Eigen::MatrixXd submatrix(const Eigen::MatrixXd& full, const std::vector<int>& rows);
 
-/// The inverse of `submatrix`: a covariance over all parameters, zero where they are fixed.
+/// Inverse of `submatrix`: a covariance over all parameters, zero where they are fixed.
 [[nodiscard]] Eigen::MatrixXd full_matrix(const Eigen::MatrixXd& part, const std::vector<int>& rows, Eigen::Index size);
 
-/// The view of all points of a board at a pose, without noise; none where one falls within `margin_px` of the image's
-/// edge or outside.
+/// Noise-free view of all points of a board at a pose; none if a point is outside the image or within `margin_px` of
+/// its border.
 [[nodiscard]] std::optional<BoardView> predicted_view(const Camera& camera,
                                                       const std::vector<Eigen::Vector3d>& board_points,
                                                       const Rigid3& cam_from_board, double margin_px = 0.0);

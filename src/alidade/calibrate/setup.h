@@ -9,21 +9,21 @@
 
 namespace alidade {
 
-/// The user's request, as calibrate() takes it: skew is fixed unless it is freed, and what is known of a port
-/// stands beside what is fixed.
+/// The user's request in the form that the solver takes: skew is fixed unless it is freed, and what is known of a port
+/// is added to the fixed parameters.
 [[nodiscard]] CalibrateConfig resolved(CalibrateConfig config);
 
-/// Every fault of `config`, one sentence each; empty if it is usable.
+/// All faults of `config`, one sentence each; empty if it is usable.
 [[nodiscard]] std::vector<std::string> faults(const CalibrateConfig& config);
 
-/// What is wrong where more than one corner in ten lies outside the images, which are then of another size; or empty.
+/// What is wrong if more than one corner in ten lies outside the images, whose size then is another one; or empty.
 [[nodiscard]] std::string outside_fault(std::span<const BoardView> views, const ImageSize& size);
 
-/// How many usable views it takes: three, two where the principal point is fixed (Zhang 2000, §3.1).
+/// Number of usable views needed: three, or two if the principal point is fixed (Zhang 2000, §3.1).
 [[nodiscard]] std::size_t min_views(const CalibrateConfig& config);
 
-/// Free parameters, priors and board of `problem`; returns the lens with every fixed parameter at its value: its
-/// prior's, else the image's centre (cx, cy), else zero. `config` must have no faults.
+/// Sets free parameters, priors and board of `problem`; returns the lens with every fixed parameter at its value: that
+/// of its prior, else the image centre (cx, cy), else zero. `config` must have no faults.
 [[nodiscard]] Lens set_up_problem(const Board& board, const CalibrateConfig& config, ImageSize size,
                                   BundleProblem& problem);
 
@@ -34,7 +34,7 @@ namespace alidade {
 [[nodiscard]] std::vector<double> shape_sigma_z(const BundleProblem& problem, const Eigen::MatrixXd& cov,
                                                 double variance_scale);
 
-/// The parameters that carry a direction of the globals, for a user: "fx, fy and the distances of the boards".
+/// The parameters that dominate a direction of the globals, for a user: "fx, fy and the distances of the boards".
 [[nodiscard]] std::string name_combination(const BundleProblem& problem, const Lens& lens,
                                            const Eigen::VectorXd& direction);
 

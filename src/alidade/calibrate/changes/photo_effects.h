@@ -10,21 +10,21 @@
 
 namespace alidade {
 
-/// What of the lens differs from photo to photo without any order: the centre, as of an image stabiliser, or the focal
-/// length, as of an autofocus that searches.
+/// A property of the lens that differs from photo to photo at random: the centre, as with an image stabiliser, or the
+/// focal length, as with a hunting autofocus.
 struct PhotoEffect {
   bool is_centre = false;
   double scatter = 0.0;  ///< σ over the photos: of cx and cy [px], or of the focal length, relative.
-  double before = 0.0;   ///< Mean square of what the photos say of the other lens parameters, in the noise's; 1: noise.
-  double after = 0.0;    ///< The same once each photo has its own.
+  double before = 0.0;   ///< Mean square deviation of the photos' other lens parameters, over that of noise; 1: noise.
+  double after = 0.0;    ///< The same with a value per photo.
 };
 
-/// The effect that explains why the photos disagree: with a centre (or focal length) of its own in each, eliminated to
-/// first order, they agree on the other lens parameters within the noise of their corners. None where they agree as
-/// they are, where neither explains it, or for fewer than eight photos.
+/// The effect that explains why the photos disagree: with a centre (or focal length) for each photo, eliminated to
+/// first order, they agree on the other lens parameters within the noise of their corners. None if they agree without
+/// it, if neither explains the disagreement, or for fewer than eight photos.
 [[nodiscard]] std::optional<PhotoEffect> photo_effect(std::span<const ViewScore> views, const CalibrateReport& report);
 
-/// Names it in the verdict, which is of care at best.
+/// Reports it in the verdict, which becomes `care` at best.
 void heed_photo_effect(const PhotoEffect& effect, Verdict& verdict);
 
 }  // namespace alidade

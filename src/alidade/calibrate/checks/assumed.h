@@ -11,19 +11,19 @@
 
 namespace alidade {
 
-/// The assumptions of a calibration: the board's square, and each fixed lens parameter. How far each would move
-/// the lens is the linearised optimum's dθ/da = −S_θθ⁻¹ S_θa, S the information of both with the poses eliminated; a
-/// square that is off moves a central lens by nothing. `report` must have converged; `scores`: its view_scores().
+/// The assumptions of a calibration: the board's square, and each fixed lens parameter. The shift of the lens by each
+/// is the sensitivity of the optimum, dθ/da = −S_θθ⁻¹ S_θa, S the information of both with the poses eliminated; a
+/// wrong square does not shift a central lens. `report` must have converged; `scores`: its view_scores().
 ///
-/// `air`: the lens that was given and fixed (flat_port). Where it has a covariance C, C is included in
-/// `report.camera.cov`: K C Kᵀ on what was estimated, K C between, K = dθ/da.
+/// `air`: the lens that was given and fixed (flat_port). If it has a covariance C, C is included in
+/// `report.camera.cov`: K C Kᵀ for the estimated parameters, K C for the cross-covariance, K = dθ/da.
 [[nodiscard]] std::vector<Assumption> count_assumptions(const Board& board, const CalibrateConfig& config,
                                                         std::span<const BoardView> views,
                                                         std::span<const ViewScore> scores,
                                                         const std::optional<Camera>& air, CalibrateReport& report);
 
-/// One row, "lens.not_tested", for what would move the lens by 5σ without showing in these photos; none where there is
-/// nothing. It has no say in the verdict.
+/// One row, "lens.not_tested", for what could shift the lens by 5σ unnoticed in these photos; none if there is nothing.
+/// It does not affect the verdict.
 [[nodiscard]] std::optional<Assumption> not_tested(std::span<const UnseenMode> unseen, const CalibrateReport& report);
 
 }  // namespace alidade

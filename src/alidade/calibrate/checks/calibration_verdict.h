@@ -10,14 +10,14 @@
 namespace alidade {
 
 /// The verdict on a calibration, one sentence and its checks: coverage, lens adequate, consistent, honest corners,
-/// board flat, principal point. Every number in the text is read off `study` and `report`. Corners that bring no
-/// covariance are judged by their tails alone.
+/// board flat, principal point. Every number in the text is taken from `study` and `report`. Corners without a
+/// covariance are judged by the tails of their residuals only.
 [[nodiscard]] Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStudy& study,
                                           std::span<const BoardView> views, const CalibrateConfig& config,
                                           const NextPhotoPlan& next);
 
-/// The verdict on a calibration that was refused or did not converge: exit code 4 or 5, what cannot be determined, what
-/// to add.
+/// The verdict on a calibration that was refused or did not converge: exit code 4 or 5, what cannot be determined, and
+/// what to add.
 [[nodiscard]] Verdict refusal_verdict(const CalibrateReport& report);
 
 }  // namespace alidade

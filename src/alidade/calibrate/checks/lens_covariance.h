@@ -5,17 +5,17 @@
 
 namespace alidade {
 
-/// Covariance of all parameters of a lens, in their order; a fixed parameter has zero rows.
+/// Covariance of all parameters of a lens, in order; zero rows for fixed parameters.
 struct LensCovariance {
-  Eigen::MatrixXd stated;       ///< Views are its clusters, as the corners of one share errors.
-  Eigen::MatrixXd model;        ///< As if every corner erred by itself.
-  ClusterCovariance clusters;   ///< The difference of the two, one value per parameter.
-  std::vector<double> weights;  ///< Of the other minima: how likely each is, all of them and `result` being 1.
+  Eigen::MatrixXd stated;       ///< Clustered by view, because the corners of one view share errors.
+  Eigen::MatrixXd model;        ///< For independent corner errors.
+  ClusterCovariance clusters;   ///< Explains the difference of the two, one value per parameter.
+  std::vector<double> weights;  ///< Probabilities of the other minima; with that of `result` they sum to 1.
 };
 
 /// `noise_variance`: of the whitened residuals. `result` must have its covariance.
-/// `others`: minima of the cost that lie elsewhere. Each is as likely as exp(−Δ/(2 c s²)) says, Δ by what its cost is
-/// greater, c the design effect, and what is stated reaches to it by that weight.
+/// `others`: other minima of the cost. The probability of each is proportional to exp(−Δ/(2 c s²)), with Δ the excess
+/// of its cost and c the design effect, and the stated covariance extends to it with that weight.
 [[nodiscard]] LensCovariance lens_covariance(const BundleProblem& problem, double noise_variance,
                                              std::span<const BundleResult> others, const BundleResult& result);
 

@@ -8,10 +8,10 @@
 
 namespace alidade {
 
-/// For each view the number of an earlier one that shows the board at the same place (within two pixels, corner by
-/// corner) and has the same residuals [px] but for half of their variance: frames of a board and a camera that stand
-/// still share what the optics and the corner finder do at that place. Counted as independent, n of them would divide
-/// the variance by n. Views at one place whose errors are independent do not repeat each other.
+/// For each view the index of an earlier one that shows the board at the same place (within two pixels, corner by
+/// corner) and has the same residuals [px] to within half of their variance: frames of an unmoved board and camera
+/// share the errors of the optics and of the corner detector at that place. Treated as independent, n of them would
+/// divide the variance by n. Views at the same place with independent errors do not count as repeated.
 [[nodiscard]] std::vector<std::optional<std::size_t>> views_with_shared_errors(
     std::span<const BoardView> views, std::span<const std::vector<Eigen::Vector2d>> residuals);
 

@@ -9,19 +9,19 @@
 
 namespace alidade {
 
-/// What one view says of all parameters of the lens, also of those that are fixed: its pose eliminated, the board as
-/// it was solved.
+/// Score and information of one view for all parameters of the lens, including fixed ones: pose eliminated, board as
+/// estimated.
 struct ViewScore {
   Eigen::MatrixXd information;
   Eigen::VectorXd gradient;
-  double depth_m = 0.0;  ///< Of the board's middle, along the optical axis.
+  double depth_m = 0.0;  ///< Depth of the board's centre along the optical axis.
 };
 
-/// One for each view in use, in their order. Empty where the linearisation fails.
+/// One per used view, in order. Empty if the linearisation fails.
 [[nodiscard]] std::vector<ViewScore> view_scores(const Board& board, CalibrateConfig config,
                                                  std::span<const BoardView> views, const CalibrateReport& report);
 
-/// Positions of the lens parameters that were estimated, and of those that were fixed.
+/// Indices of the lens parameters that were estimated, and of those that were fixed.
 struct LensSplit {
   std::vector<Eigen::Index> free, fixed;
 };

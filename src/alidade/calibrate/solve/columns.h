@@ -17,13 +17,13 @@ struct PointArrays {
 
 /// The whitened Jacobian of one view and its residual, column by column: rows 0…n−1 are u, rows stride…stride+n−1
 /// are v, the rest is zero. Columns: lens parameters, 6 of the pose (right perturbation [translation, rotation]),
-/// residual (prediction − seen), zero. The first three pose columns are also the derivative by the board point.
+/// residual (prediction − observation), zero. The first three pose columns are also the derivative by the board point.
 class Columns {
  public:
   static constexpr int max_lens = 16;
   static constexpr int pose = max_lens, residual = pose + 6, bow = residual + 1, zero = bow + 2, count = zero + 1;
 
-  /// Makes room for n corners.
+  /// Allocates for n corners.
   void resize(std::size_t num_corners);
   [[nodiscard]] std::size_t stride() const { return stride_; }  ///< n rounded up to whole vectors.
   [[nodiscard]] std::size_t num_rows() const { return 2 * stride_; }
@@ -37,18 +37,18 @@ class Columns {
   std::vector<double> data_;
 };
 
-/// A lens with what its inner loop needs and is dear to find: made once a linearisation.
+/// A lens with precomputed values for its inner loop: made once per linearisation.
 struct PreparedLens {
   Lens lens;
   double max_radius2 = 0.0;  ///< Brown: squared radius where the radial map folds.
 };
 [[nodiscard]] PreparedLens prepare(const Lens& lens);
 
-/// Fills `columns` for one view. False where a corner that counts cannot be projected: the step is to be refused.
+/// Fills `columns` for one view. False if a used corner cannot be projected: the step is then rejected.
 [[nodiscard]] bool fill_columns(const PreparedLens& lens, const Rigid3& cam_from_board, const PointArrays& points,
                                 const ViewArrays& view, Columns& columns);
 
-/// Residual (prediction − seen) [px] of every corner, not whitened; NaN where it cannot be projected.
+/// Residual (prediction − observation) [px] of every corner, not whitened; NaN if it cannot be projected.
 [[nodiscard]] std::vector<Eigen::Vector2d> residuals_px(const PreparedLens& lens, const Rigid3& cam_from_board,
                                                         const PointArrays& points, const ViewArrays& view);
 

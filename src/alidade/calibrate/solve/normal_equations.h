@@ -19,7 +19,7 @@ struct NormalEquations {
   std::vector<double> W;                       ///< View by view, globals × 6 column-major.
   std::vector<Eigen::Matrix<double, 6, 6>> V;  ///< Lower triangle.
   std::vector<Eigen::Matrix<double, 6, 1>> pose_gradient;
-  /// What each view alone brought to the dense globals (lens and bow): its H and gradient, dense × (dense + 1).
+  /// Contribution of each view to the dense globals (lens and bow): H and gradient, dense × (dense + 1).
   int num_dense = 0;
   std::vector<double> view_dense;
 
@@ -33,7 +33,7 @@ struct NormalEquations {
 };
 
 /// Cholesky factor L of a view's pose block. Eigen packs blocks before it solves for several columns, which takes
-/// longer than these six rows do.
+/// longer than the solve of these six rows itself.
 class PoseFactor {
  public:
   explicit PoseFactor(const Eigen::Matrix<double, 6, 6>& V) : llt_(V) {
@@ -81,13 +81,13 @@ struct BowBasis {
 };
 [[nodiscard]] BowBasis bow_basis(const std::vector<Eigen::Vector3d>& printed_points);
 
-/// The seven directions (orthonormal rows, 7 × 3n) in which a point set moves rigidly or grows: the free gauge.
+/// The seven directions (orthonormal rows, 7 × 3n) in which a point set moves rigidly or scales: the gauge freedom.
 [[nodiscard]] Eigen::MatrixXd gauge_directions(const std::vector<Eigen::Vector3d>& points);
 
 /// Number of global unknowns of a problem.
 [[nodiscard]] int num_globals(const BundleProblem& problem);
 
-/// Fills `equations` at `state`. False where a corner cannot be projected: this state is not to be entered.
+/// Fills `equations` at `state`. False if a corner cannot be projected: this state must be rejected.
 [[nodiscard]] bool linearize(const BundleProblem& problem, const BundleState& state, NormalEquations& equations);
 
 }  // namespace alidade

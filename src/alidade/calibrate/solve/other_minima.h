@@ -8,16 +8,16 @@
 
 namespace alidade {
 
-/// Initial guesses away from `found`, where the views determine its principal point poorly (σ over a hundredth of the
-/// image's width): the point moved by a fifth of the width each way, no distortion, poses by the views. In a narrow
+/// Initial guesses away from `found`, if the views determine its principal point poorly (σ above a hundredth of the
+/// image width): the point moved by a fifth of the width either way, no distortion, poses from the views. In a narrow
 /// image a moved principal point, distortion and tilts of the boards have similar effects, and the cost may have
-/// several minima. Empty where the point is well determined, or fixed. `found` must have its covariance, in units of
+/// several minima. Empty if the point is well determined, or fixed. `found` must have its covariance, in units of
 /// `noise_variance`.
 [[nodiscard]] std::vector<BundleState> starts_elsewhere(const BundleProblem& problem, const BundleResult& found,
                                                         double noise_variance, std::span<const BoardView> views,
                                                         int width_px);
 
-/// The minima to which solves from these initial guesses converge, other than `found`: each once, lowest cost first.
+/// The minima to which solves from these guesses converge, other than `found`: without duplicates, lowest cost first.
 [[nodiscard]] std::vector<BundleResult> other_minima(const BundleProblem& problem, const BundleResult& found,
                                                      const std::vector<BundleState>& starts,
                                                      const BundleConfig& config);

@@ -8,9 +8,9 @@
 
 namespace alidade {
 
-/// The views that take part, and what is known of them so far.
+/// The views that are used, and what is known of them so far.
 struct CalibrationWork {
-  std::vector<std::size_t> number;  ///< Position of each in the caller's views.
+  std::vector<std::size_t> number;  ///< Index of each in the caller's views.
   std::vector<BoardView> views;
   std::vector<std::vector<bool>> far;  ///< Corners that are not used for the initial guess.
   std::vector<ViewArrays> arrays;
@@ -18,11 +18,11 @@ struct CalibrationWork {
   bool use_covariances = false;
 };
 
-/// Rejects a view; the report says why.
+/// Rejects a view, with the reason in the report.
 void drop_view(std::size_t at, const std::string& reason, CalibrateReport& report, CalibrationWork& work,
                BundleState& state);
 
-/// Every corner with the same weight, but none for the far ones where outliers are to be rejected.
+/// All corners with the same weight, except that far ones get none if outliers are to be rejected.
 void make_all_arrays(const CalibrateConfig& config, CalibrationWork& work);
 
 /// p: free lens, pose and board parameters.
@@ -31,15 +31,15 @@ void make_all_arrays(const CalibrateConfig& config, CalibrationWork& work);
 /// s² of the whitened residuals.
 [[nodiscard]] double variance_of(const CalibrationWork& work, const BundleResult& result, const NoiseEstimate& noise);
 
-/// The least minimum of the cost that was found, and the others.
+/// The lowest minimum of the cost that was found, and the others.
 struct Minima {
   BundleResult least;
-  bool settled = false;  ///< The least did.
+  bool settled = false;  ///< The lowest one has converged.
   std::vector<BundleResult> others;
 };
 
-/// Solves from a start, with its covariance: weights by the residuals, outliers rejected, and of several minima, where
-/// the views may have some, the least.
+/// Solves from an initial guess, with covariance: weights from the residuals, outliers rejected, and of several minima
+/// (if the views may have some) the lowest.
 [[nodiscard]] Minima solve_robustly(const CalibrateConfig& config, ImageSize size, BundleState start,
                                     CalibrateReport& report, CalibrationWork& work, NoiseEstimate& noise);
 

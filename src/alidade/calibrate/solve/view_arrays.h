@@ -9,7 +9,7 @@
 namespace alidade {
 
 /// The corners of one view as arrays, for the inner loop: pixel and whitener of each.
-/// The whitener is the upper triangle (a b; 0 c) with WᵀW = inverse covariance; zero leaves the corner out.
+/// The whitener is the upper triangle (a b; 0 c) with WᵀW = inverse covariance; zero excludes the corner.
 struct ViewArrays {
   std::vector<std::int32_t> index;
   std::vector<double> u_px, v_px;

@@ -7,20 +7,20 @@
 
 namespace alidade {
 
-/// The influence of each view on the free lens parameters, its pose eliminated, the board's shape estimated: the
-/// clusters of their covariance, for whitened_cluster_covariance(). `result` must have its covariance, of which L Lᵀ is
-/// the free lens parameters' block; views without a pose stand as zeros.
+/// The influence of each view on the free lens parameters, pose eliminated, board shape estimated: the
+/// clusters of their covariance, for whitened_cluster_covariance(). `result` must have its covariance; L Lᵀ is its
+/// block of the free lens parameters. Steps of views without a pose are zero.
 [[nodiscard]] std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result,
                                                   const Eigen::MatrixXd& L);
 
-/// The other way: what each corner of the board does in all views together, and how much of it single corners would.
+/// Clusters by board corner: the influence of each corner in all views, and the part due to independent errors.
 struct CornerSteps {
-  std::vector<ClusterStep> steps;  ///< Whitened, without shares: those of the board's corners are alike.
-  Eigen::MatrixXd by_themselves;   ///< Their scatter, were the errors of a corner in two views independent.
+  std::vector<ClusterStep> steps;  ///< Whitened, without shares: the corners of a board are alike.
+  Eigen::MatrixXd by_themselves;   ///< Their scatter if the errors of a corner in different views were independent.
 };
 
-/// A board that is not as it was taken to be moves the same corner alike in every photo. Of many views some will do, as
-/// what is shared by all of them shows in each. No steps where every point of the board is free.
+/// A deformed board displaces the same corner in the same way in every photo. With many views a sample suffices,
+/// because what all of them share shows in each. No steps if every point of the board is free.
 [[nodiscard]] CornerSteps corner_steps(const BundleProblem& problem, const BundleResult& result,
                                        const Eigen::MatrixXd& L);
 

@@ -26,7 +26,7 @@ ObserveNuisances with_rotation(ObserveNuisances nuisances) {
   return nuisances;
 }
 
-/// σ² of the measured rates, where they are noisy; 0: they are not. [rad²/s²]
+/// Variance of the measured rates [rad²/s²], if they are treated as noisy; otherwise 0.
 double rate_variance(const Adjustment& reference) {
   const BundleSolution& solution = reference.solution;
   const auto& frames = reference.bundle.frames;
@@ -40,10 +40,10 @@ double rate_variance(const Adjustment& reference) {
   return count > 0.0 ? sum / count : 0.0;
 }
 
-/// Whether a rate is measured with so much noise that its scale cannot be tested: that of the noise is −1, and that of
-/// both is off by their ratio (errors in variables).
+/// Whether a rate is so noisy that its scale cannot be tested: the noise alone would give a scale error of −1, and
+/// signal and noise together one of their ratio (errors in variables).
 bool is_mostly_noise(const RotationLog& log, const RotationError& error, double variance) {
-  constexpr double max_share = 1e-3;  // of the mean square
+  constexpr double max_share = 1e-3;  // of the mean square of the rate
   if (error.cause != "scale of the rates" || variance == 0.0) return false;
   const int axis = error.member.back() - 'x';
   double squares = 0.0;
@@ -116,7 +116,7 @@ void CauseColumns::add_lens() {
   static constexpr const char* names[] = {"k1", "k2", "k3", "p1", "p2"};
   for (const char* name : names) columns_.push_back({name, "", name[0] == 'k' ? usual_k : usual_p});
   const bool is_free[] = {base_.k1 >= 0, base_.k2 >= 0, base_.k3 >= 0, base_.tangential >= 0, base_.tangential >= 0};
-  // Each alone, the radial ones together, all: what is free already is omitted.
+  // Each coefficient alone, the radial ones together, then all; those already estimated are omitted.
   constexpr std::pair<int, int> ranges[] = {{0, 1}, {1, 2}, {2, 3}, {3, 5}, {0, 2}, {0, 3}, {0, 5}};
   for (const auto& [from, until] : ranges) {
     Group group;
@@ -131,7 +131,7 @@ void CauseColumns::add_lens() {
   }
 }
 
-/// A focal length that comes and goes: half waves over the log.
+/// A focal length that varies: cosines of 1 to `num_waves` half periods over the log.
 void CauseColumns::add_zoom() {
   first_zoom_ = size();
   for (int wave = 1; wave <= num_waves; ++wave) {
@@ -140,7 +140,7 @@ void CauseColumns::add_zoom() {
   }
 }
 
-/// Each instant is a cause of its own.
+/// Each candidate instant is a separate cause: a rotation about three axes [rad] from that instant on.
 void CauseColumns::add_steps() {
   first_step_ = size();
   for (const double from_s : steps_s_) {
@@ -161,12 +161,12 @@ void CauseColumns::add_lever() {
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     return times[static_cast<std::size_t>(a)] > times[static_cast<std::size_t>(b)];
   });
-  // The first has the common one: only what the others have beside it can be separated from that.
+  // The most observed point carries the common parallax: only the others' deviations from it can be separated.
   for (std::size_t i = 1; i < order.size() && i <= max_lever_points; ++i) {
     lever_column_[static_cast<std::size_t>(order[i])] = size();
     add("lever", "z over distance, a point's own", usual_parallax_rad, "rad");
   }
-  // Across the view what all points share is another principal point.
+  // Across the view, a parallax shared by all points is equivalent to a shift of the principal point.
   groups_.push_back({"lever across the view", {first_lever_, first_lever_ + 1}});
   for (std::size_t i = 1; i < order.size() && i <= max_across_points; ++i) {
     across_column_[static_cast<std::size_t>(order[i])] = size();
@@ -183,14 +183,14 @@ void CauseColumns::begin_frame(int frame) {
   view_.emplace(camera, now);
   const Eigen::Matrix3d cam_from_mount = camera.cam_from_mount.toRotationMatrix();
   mount_from_cam_ = cam_from_mount.transpose();
-  // The log's rotation is the mount's, from where it began; the camera rotated on it then as it does now.
+  // The log gives the rotation of the mount since the start; the camera was mounted on it then as it is now.
   const Eigen::Matrix3d mount_from_begin = now.cam_from_start.toRotationMatrix(), begin_from_start = mount_from_cam_;
   cam_from_start_ = cam_from_mount * mount_from_begin * begin_from_start;
 }
 
 void CauseColumns::fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const {
   const Eigen::Vector4d k = reference_.solution.camera.k_at(frame_time_s_);
-  // Given the distorted point, all five are linear.
+  // The distorted point is linear in all five coefficients.
   const double x = in_cam.x() / in_cam.z(), y = in_cam.y() / in_cam.z(), r2 = x * x + y * y;
   const Eigen::Vector2d radial(k[0] * x * r2, k[1] * y * r2);
   out.col(first_k1_) = radial;
@@ -225,7 +225,7 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
     by_causes.col(first_zoom_ + wave) = std::cos((wave + 1) * phase) * (p.px - reference_.solution.camera.k.tail<2>());
   }
   if (first_lever_ >= 0) {
-    // A pixel feels a shift v of its ray as the rotation ray × v / |ray|².
+    // A shift v of the ray moves the pixel like the rotation ray × v / |ray|².
     const Eigen::Vector3d turned = mount_from_cam_ * in_cam;
     const Eigen::Matrix3d shift = mount_from_cam_ * (cam_from_start_ - Eigen::Matrix3d::Identity());
     const Eigen::Matrix<double, 2, 3> by_lever = by_rotation * (cross_matrix(turned) * shift) / in_cam.squaredNorm();

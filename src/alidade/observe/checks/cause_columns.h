@@ -4,17 +4,17 @@
 
 namespace alidade {
 
-/// Derivatives of a pixel by everything that is taken as exact, one column a number.
+/// Derivatives of a pixel by every parameter that is assumed exact, one column per scalar.
 class CauseColumns {
  public:
   struct Group {
     std::string name;
     std::vector<int> columns;
-    double from_s = not_seen;  ///< Of a step.
+    double from_s = not_seen;  ///< For a step: its instant [s].
   };
   struct Column {
     std::string member, unit;
-    double ordinary = 1.0;  ///< σ of what there ordinarily is of it.
+    double ordinary = 1.0;  ///< σ of its typical size.
   };
 
   CauseColumns(const RotationLog& log, const Adjustment& reference, const CauseConfig& config);
@@ -25,9 +25,9 @@ class CauseColumns {
   [[nodiscard]] const CommonLayout& layout() const { return base_; }
 
   void begin_frame(int frame);
-  /// Of the observation: the pixel as predicted, J by the estimated parameters, by the point, by the causes.
+  /// For one observation: the predicted pixel, and J by the estimated parameters, by the point and by the causes.
   [[nodiscard]] bool at(const BundleObservation& seen, RotationPrediction& p, Eigen::Ref<Eigen::MatrixXd> by_causes);
-  /// Of the observation that was asked for last, J by its frame's rotation.
+  /// J by the rotation of the frame, for the observation of the last call of at().
   [[nodiscard]] Eigen::Matrix<double, 2, 3> by_rotation() const {
     return wide_prediction_.J_px_common.middleCols<3>(wide_.rotation);
   }
@@ -45,8 +45,8 @@ class CauseColumns {
   double height_;
   std::vector<TurnPattern> patterns_;
   std::vector<std::size_t> row_of_frame_;
-  std::vector<int> lever_column_;   ///< Of a point's own parallax; −1: it has none.
-  std::vector<int> across_column_;  ///< And of its parallax across the view: two columns.
+  std::vector<int> lever_column_;   ///< Per point: column of its own parallax; −1: none.
+  std::vector<int> across_column_;  ///< Per point: first of two columns, parallax across the view; −1: none.
   std::vector<Group> groups_;
   std::vector<Column> columns_;
   int first_k1_ = -1, first_mount_ = -1, first_delay_ = -1, shutter_ = -1, drift_ = -1, first_pattern_ = -1,

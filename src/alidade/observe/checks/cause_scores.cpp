@@ -18,26 +18,26 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t max_observations = 40000;  // thinned by frames: power falls, the test does not
+constexpr std::size_t max_observations = 40000;  // above it, frames are thinned: less power, same validity
 constexpr int num_blocks = 12;
 constexpr double estimated_effect = 1.5;
-constexpr std::size_t min_tracks = 12;     // fewer do not show what the errors of a track share
-constexpr double largest_of_tracks = 4.0;  // of a tracker's errors: what scatters more has a cause that must not hide
-constexpr double min_given = 1e-10;        // of a cause's information that is its own: the rest is rounding
+constexpr std::size_t min_tracks = 12;     // fewer do not reveal the errors that are shared along a track
+constexpr double largest_of_tracks = 4.0;  // a tracker's errors; larger scatter has a cause and must not hide it
+constexpr double min_given = 1e-10;        // eigenvalue of a cause's own share of information; smaller is rounding
 
-/// Score and information of a block of time, or of a track, points eliminated: estimated parameters, then causes.
+/// Score and information of a block of time or of a track, points eliminated; order: estimated parameters, causes.
 struct Block {
   VectorXd gradient;
   MatrixXd information;
 };
 
-/// Columns of a cause after the estimated parameters have followed them, in units of their own information.
+/// Columns of a cause with the estimated parameters eliminated, scaled to unit information of their own.
 struct ReducedCause {
-  std::vector<Index> at;  ///< In the whole system.
-  MatrixXd follow;        ///< n × width: estimated parameters per unit of each.
-  VectorXd unit;          ///< Per column.
-  MatrixXd S, S_inverse;  ///< Information, and its inverse where it is determined.
-  double rank = 1.0;      ///< At least 1.
+  std::vector<Index> at;  ///< Indices in the whole system.
+  MatrixXd follow;        ///< n × width: change of the estimated parameters per unit of each column.
+  VectorXd unit;          ///< Scale per column.
+  MatrixXd S, S_inverse;  ///< Information (Schur complement) and its pseudo-inverse.
+  double rank = 1.0;      ///< Rank of S, at least 1.
 
   ReducedCause(const Block& all, const MatrixXd& inverse_nn, std::vector<Index> columns) : at(std::move(columns)) {
     MatrixXd cross(width(), inverse_nn.rows());
@@ -59,7 +59,7 @@ struct ReducedCause {
   [[nodiscard]] VectorXd score(const VectorXd& gradient) const {
     return unit.asDiagonal() * (gradient(at) + follow.transpose() * gradient.head(follow.rows()));
   }
-  /// Of all parameters, for one of the cause.
+  /// Step of all parameters for a step of the cause.
   [[nodiscard]] VectorXd step(const VectorXd& of_cause, Index size) const {
     VectorXd all = VectorXd::Zero(size);
     all.head(follow.rows()) = follow * of_cause;
@@ -68,12 +68,12 @@ struct ReducedCause {
   }
 };
 
-/// Variance of scores over what independent observations would leave, as so many clusters show it.
+/// Variance of the scores over that for independent observations, and the number of clusters it was estimated from.
 struct DesignEffect {
   double value = 1.0, clusters = num_blocks;
 };
 
-/// A design effect estimated from few clusters is uncertain itself: of Hotelling's statistic, the χ² that is as rare.
+/// A design effect estimated from few clusters is itself uncertain: the χ² that is as improbable as Hotelling's T².
 double as_rare_chi2(double chi2, const DesignEffect& effect) {
   const double dof = effect.clusters - 1.0;
   return effect.value > estimated_effect ? dof * std::log1p(std::max(chi2, 0.0) / dof) : chi2;
@@ -84,7 +84,7 @@ class Linearisation {
   Linearisation(const RotationLog& log, const Adjustment& reference, const CauseConfig& config)
       : reference_(reference), columns_(log, reference, config), n_(columns_.layout().size), q_(columns_.size()) {
     const std::size_t count = reference.bundle.observations.size();
-    const bool is_rotated = has_rotations(reference.solution);  // of few frames
+    const bool is_rotated = has_rotations(reference.solution);  // has few frames: not thinned
     if (!is_rotated) every_ = static_cast<int>((count + max_observations - 1) / max_observations);
     is_rotated ? eliminate_rotations() : eliminate_points();
     gather();
@@ -138,7 +138,7 @@ class Linearisation {
     rotations_->solve();
   }
 
-  /// Derivatives by estimated parameters and causes, with all else following.
+  /// Derivatives by estimated parameters and causes, with points and rotations eliminated.
   [[nodiscard]] MatrixXd followed(const BundleObservation& seen, const MatrixXd& by_causes) const {
     MatrixXd J = columns_of(by_causes);
     if (rotations_) return rotations_->followed(seen, J, columns_.by_rotation(), prediction_.J_px_point);
@@ -155,7 +155,7 @@ class Linearisation {
     return blocks_[static_cast<std::size_t>(std::clamp(static_cast<int>(elapsed_s / block_s), 0, num_blocks - 1))];
   }
 
-  /// A mount, a late clock: where rotations are not measured they are nothing.
+  /// Mount and delay cannot be distinguished from rotations that are not measured: such columns are set to zero.
   void leave_out_absorbed() {
     for (Index i = n_; i < n_ + q_; ++i) {
       if (!rotations_->is_absorbed(i, all_.information(i, i))) continue;
@@ -214,16 +214,16 @@ class Linearisation {
   CauseColumns columns_;
   Index n_, q_;
   int every_ = 1;
-  double seen_ = 1.0;                             ///< Of the variance of sums, within blocks.
-  std::vector<MatrixXd> by_point_;                ///< How each point follows the causes; where rotations are estimated,
-  std::optional<EliminatedRotations> rotations_;  ///< these and the points.
-  std::vector<Block> blocks_, by_track_;          ///< Of tracks rows of the estimated parameters alone.
+  double seen_ = 1.0;                             ///< Share of a sum's variance that is seen within blocks.
+  std::vector<MatrixXd> by_point_;                ///< Change of each point per unit of the causes; if rotations are
+  std::optional<EliminatedRotations> rotations_;  ///< estimated, this eliminates them and the points instead.
+  std::vector<Block> blocks_, by_track_;          ///< `by_track_` has only the rows of the estimated parameters.
   Block all_;
   MatrixXd inverse_nn_;
   RotationPrediction prediction_;
 };
 
-/// Scatter of the score over blocks of time, over what independent observations would leave.
+/// Scatter of the score between blocks of time over that of independent observations; that between tracks if larger.
 DesignEffect Linearisation::design_effect(const ReducedCause& cause, const VectorXd& step) const {
   MatrixXd scatter = MatrixXd::Zero(cause.width(), cause.width());
   for (const Block& block : blocks_) {
@@ -235,8 +235,8 @@ DesignEffect Linearisation::design_effect(const ReducedCause& cause, const Vecto
   return by_tracks.value > by_blocks ? by_tracks : DesignEffect{std::max(1.0, by_blocks)};
 }
 
-/// The same over tracks, in the directions of the estimated parameters: a cause may have a parameter for each point,
-/// which takes up all that the errors of its track share.
+/// The same between tracks, in the directions of the estimated parameters: a cause may have one parameter per point,
+/// which absorbs all errors that are shared along its track.
 DesignEffect Linearisation::effect_of_tracks(const VectorXd& step) const {
   if (by_track_.empty()) return {};
   MatrixXd scatter = MatrixXd::Zero(n_, n_);
@@ -250,8 +250,8 @@ DesignEffect Linearisation::effect_of_tracks(const VectorXd& step) const {
   return effect > by_chance ? DesignEffect{std::min(effect, largest_of_tracks), count} : DesignEffect{};
 }
 
-/// What it would take of the cause may be more than there ever is: a posterior, with a prior of ordinary sizes. The
-/// share of the likelihood's maximum that is left, `explained` being that maximum.
+/// The value that the score asks for may be larger than is plausible: posterior with a prior of typical sizes. Returns
+/// the share of the maximum of the likelihood, `explained`, that remains.
 double Linearisation::likely_share(const CauseColumns::Group& group, const ReducedCause& cause, const VectorXd& score,
                                    double explained, double effect) const {
   VectorXd prior(cause.width());
@@ -287,7 +287,7 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   return result;
 }
 
-/// Of the steps only the one that explains most.
+/// Keeps only that step of the mounting which explains most.
 void keep_best_step(std::vector<CauseScore>& scores) {
   const auto is_step = [](const CauseScore& score) { return score.name == step_cause; };
   const CauseScore* best = nullptr;
@@ -312,7 +312,7 @@ std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& r
   keep_best_step(scores);
   const auto step = std::ranges::find(scores, std::string(step_cause), &CauseScore::name);
   if (step == scores.end() || step->z < asked) return scores;
-  // When it was, more closely.
+  // Refines the instant of the step.
   with_steps.steps_s.clear();
   for (int k = 0; k <= num_closer; ++k)
     with_steps.steps_s.push_back(step->from_s + (2.0 * k / num_closer - 1.0) * apart_s);

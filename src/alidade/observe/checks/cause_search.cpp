@@ -1,4 +1,4 @@
-// Where several things are not as assumed at once, none of them explains much alone: sets of them are tried.
+// If several assumptions are violated at once, no single cause explains much: sets of causes are tried.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t max_search_frames = 120, max_search_points = 40;
 constexpr double ordinary_step_rad = 0.02;
 
-/// What a trial frees beside what is estimated already.
+/// The parameters that a trial estimates in addition to those already estimated.
 struct Trial {
   bool lens = false, mount = false, delay = false, shutter = false, lever = false, drift = false;
   std::vector<std::string> errors = {};
@@ -22,8 +22,8 @@ const std::string scale_cause = "encoder scale", backlash_cause = "backlash", ze
                   attitude_cause = "attitude that drifts", clock_cause = "clock rate",
                   axes_cause = "axes that are not perpendicular";
 
-/// Simple ones first: of those that explain about as well the first is taken. A lever has a depth for every point
-/// beside it, and one of a metre does what a lens and a mounting do.
+/// Simple ones first: among trials that explain about equally well, the first is taken. A lever comes with a depth per
+/// point, and a lever of a metre can imitate a lens and a mounting.
 const std::vector<Trial>& trials() {
   static const std::vector<Trial> all{
       {.lens = true},
@@ -80,7 +80,7 @@ int size_of_layout(const RotationLog& log, const ObserveSetup& config) {
   return CommonLayout(nuisances).size;
 }
 
-/// The log's frames with the points that are seen most, behind the one whose range is measured.
+/// The frames of the log with the most observed points; the point with measured range comes first.
 struct Sample {
   std::vector<RotationFrame> frames;
   std::vector<std::vector<Eigen::Vector2d>> px;
@@ -110,7 +110,7 @@ Sample sample_of(const RotationLog& log, const ObserveSetup& config, const Pixel
   return sample;
 }
 
-/// At most about so many of the frames.
+/// About `max_frames` of the frames at most, evenly spaced.
 FrameBuffer buffer_of(const std::vector<RotationFrame>& frames, const Sample& sample,
                       std::size_t max_frames = max_search_frames) {
   const std::size_t num_points = sample.px.empty() ? 0 : sample.px.front().size();
@@ -139,12 +139,12 @@ AdjustConfig trial_config(const RotationLog& log, const ObserveSetup& config, co
   adjust_with.gives_up = true;
   adjust_with.nuisances.errors = num_errors;
   adjust_with.sigma_px = 0.0;
-  adjust_with.range_point = 0;  // of a sample
+  adjust_with.range_point = 0;  // index in the sample
   if (!config.start) adjust_with.other_starts = {2.5};
   return adjust_with;
 }
 
-/// σ of a pixel [px] with which all rows are explained; infinite: not at all.
+/// σ of a pixel [px] with which all rows are explained; infinite if they are not explained.
 double noise_of(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report, const Sample& sample,
                 const Progress& progress) {
   std::vector<RotationFrame> frames = sample.frames;
@@ -153,7 +153,7 @@ double noise_of(const RotationLog& log, const ObserveSetup& config, const Observ
   const AdjustConfig adjust_with = trial_config(log, config, report, static_cast<int>(errors.size()));
   const Adjustment adjustment = adjust(buffer_of(frames, sample), adjust_with, progress);
   const std::size_t seen = adjustment.num_rejected + adjustment.bundle.observations.size();
-  constexpr double max_rejected = 0.4;  // beyond it no verdict stands
+  constexpr double max_rejected = 0.4;  // with more, no verdict is possible
   if (!adjustment.has_value ||
       static_cast<double>(adjustment.num_rejected) > max_rejected * static_cast<double>(seen)) {
     return std::numeric_limits<double>::infinity();
@@ -161,7 +161,7 @@ double noise_of(const RotationLog& log, const ObserveSetup& config, const Observ
   return adjustment.sigma_px * report.scale.scale;
 }
 
-/// Bundles of a log whose mounting has a step.
+/// Adjusts bundles of a log under the hypothesis of a step of the mounting.
 class StepSearch {
  public:
   StepSearch(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
@@ -172,7 +172,7 @@ class StepSearch {
         progress_(progress) {
     adjust_with_.reject = false;
   }
-  /// Of a rotation of the camera on its mount at that time, all pixels counted.
+  /// With a rotation of the camera on its mount at time `t_s`; the noise is that of all pixels.
   [[nodiscard]] MountingStep at(double t_s, std::size_t max_frames) const {
     std::vector<RotationFrame> frames = sample_.frames;
     for (RotationFrame& frame : frames) {
@@ -214,7 +214,7 @@ std::optional<ObserveSetup> searched_causes(const RotationLog& log, const Observ
     least = std::min(least, noise_px);
     found.emplace_back(noise_px, std::move(freer));
   };
-  // Where the richest do not explain it, none does.
+  // If the largest sets do not explain the log, no set does.
   const double as_given = noise_of(log, config, report, sample, progress);
   constexpr double clearly = 0.6;
   max_noise_px = std::min(max_noise_px, clearly * as_given);
@@ -233,13 +233,13 @@ std::optional<MountingStep> mounting_step(const RotationLog& log, const ObserveS
                                           const Progress& progress) {
   constexpr int num_times = 12;
   constexpr std::size_t few_frames = 60, many_frames = 120;
-  // Missed by half of the time between two trials a step leaves about half of the residuals; what is none, nearly all.
+  // A trial that misses a step by half the spacing of trials leaves about half of the residuals; without a step, most.
   constexpr double hardly = 0.7;
   if (log.source == RotationSource::none || log.rows.size() < 10 || log.num_points < 2) return std::nullopt;
   const StepSearch search(log, config, report, progress);
   const double duration_s = search.until_s() - search.from_s();
   const double without_px = search.at(search.until_s() + 1.0, few_frames).noise_px;
-  // A mounting that is askew throughout is no step.
+  // A mounting that is rotated throughout is not a step.
   const double askew_px = config.nuisances.mount ? without_px : search.at(search.from_s(), few_frames).noise_px;
   const double enough_px = std::min(max_noise_px, max_share * std::min(without_px, askew_px));
   MountingStep best{search.from_s(), Eigen::Vector3d::Zero(), std::numeric_limits<double>::infinity()};
@@ -285,7 +285,7 @@ bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const Obser
     AdjustConfig zooming = still;
     zooming.nuisances.drift = true;
     const Adjustment one = adjust(buffer, still, progress), changing = adjust(buffer, zooming, progress);
-    if (!one.has_value || !changing.has_value) continue;  // a second that determines nothing
+    if (!one.has_value || !changing.has_value) continue;  // a second of the log that does not determine the camera
     ++judged;
     const bool is_better = changing.sigma_px < clearly * one.sigma_px;
     varying += is_better && std::abs(changing.solution.camera.drift_per_s) > slowest_per_s ? 1 : 0;

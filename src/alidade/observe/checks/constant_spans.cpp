@@ -16,7 +16,7 @@ constexpr const char* advice =
     ": more has changed than fx, fy, cx, cy (distortion or a roll that goes with the zoom, a bump of the camera); part "
     "the log at the zooms and observe each part, or calibrate at each zoom";
 
-/// What the rows of one constant span say by themselves.
+/// The result of the rows of one constant span alone.
 struct SpanAnswer {
   HybridObserver::ConstantSpan span;
   ObserveSolution report;
@@ -26,7 +26,7 @@ struct SpanAnswer {
   }
 };
 
-/// The longest first, then the last, then by length: so many that they take about as long as the whole.
+/// Longest span first, then the current one, then by length; at most 8, which takes about as long as the whole log.
 std::vector<HybridObserver::ConstantSpan> spans_to_compare(std::vector<HybridObserver::ConstantSpan> spans) {
   constexpr double shortest_s = 1.0;
   constexpr std::size_t most = 8;
@@ -56,7 +56,7 @@ class SpanSolver {
     config_.height_px = report.height_px;
   }
 
-  /// By what is estimated of the whole log, or by what the span's own residuals indicate as well.
+  /// Estimates what the whole log estimates or, if `is_searched`, also what the span's own residuals indicate.
   [[nodiscard]] std::optional<SpanAnswer> answer_of(const HybridObserver::ConstantSpan& span, bool is_searched) {
     RotationLog part = header_;
     for (const RotationRow& row : log_.rows)
@@ -98,10 +98,10 @@ Eigen::VectorXd difference_of(const ObserveReport& a, const ObserveReport& b, Ei
   return difference;
 }
 
-/// The difference of two answers in quantities `from` to `from + size`, where their σ together do not explain it.
+/// The difference of two answers in the `size` quantities from index `from`, if it exceeds their joint σ.
 struct Disagreement {
   Eigen::Index worst = 0;
-  double z = 0.0;  ///< Of the worst quantity.
+  double z = 0.0;  ///< Of the quantity that differs most.
 };
 
 std::optional<Disagreement> disagreement_of(const ObserveReport& a, const ObserveReport& b, Eigen::Index from,
@@ -139,7 +139,7 @@ std::optional<Check> differs(const SpanAnswer& span, const SpanAnswer& longest) 
                   found->z);
 }
 
-/// A cause that the whole log's residuals do not indicate. (The filter follows a focal length that creeps.)
+/// A cause that the residuals of the whole log do not indicate. (The filter follows a slowly drifting focal length.)
 std::optional<Check> indicates_more(const SpanAnswer& span, const ObserveSolution& report) {
   const CauseScore* most = nullptr;
   for (const CauseScore& cause : span.report.causes) {
@@ -163,7 +163,7 @@ std::optional<Check> ends_elsewhere(const SpanAnswer& span, const ObserveSolutio
                   found->z);
 }
 
-/// By how much fx, fy, cx, cy would be off if the rest were as in another span: by the regression of their covariance.
+/// Error of fx, fy, cx, cy if the other parameters were those of another span: regression from their covariance.
 Eigen::Array4d errors_by_the_rest(const ObserveSolution& span, const ObserveSolution& other) {
   const Eigen::Index size = span.covariance.rows() - num_intrinsics;
   const bool is_same =
@@ -174,8 +174,8 @@ Eigen::Array4d errors_by_the_rest(const ObserveSolution& span, const ObserveSolu
   return (span.covariance.topRightCorner(num_intrinsics, size) * rest.solve(difference)).array().abs();
 }
 
-/// How far the filter's rows may be off, the largest of each intrinsic over fx: at the ends of the spans, or between
-/// them with what the longest has beside fx, fy, cx, cy.
+/// Possible error of the filter's rows, largest per intrinsic, over fx: at the ends of the spans,
+/// or between them if the parameters other than fx, fy, cx, cy were those of the longest span.
 Eigen::Array4d filter_errors(const std::vector<SpanAnswer>& answers, const RotationLog& log,
                              const std::vector<IntrinsicsEstimate>& rows) {
   Eigen::Array4d largest = Eigen::Array4d::Zero();
@@ -188,7 +188,7 @@ Eigen::Array4d filter_errors(const std::vector<SpanAnswer>& answers, const Rotat
   return largest;
 }
 
-/// Each span's rows as its own adjustment has them; those of zooms between them as uncertain as the filter is wrong.
+/// Gives each span's rows its own adjustment; σ of the rows between them (zooms) includes the error of the filter.
 void take_rows(const std::vector<SpanAnswer>& answers, const RotationLog& log, std::vector<IntrinsicsEstimate>& rows) {
   const Eigen::Array4d off = filter_errors(answers, log, rows);
   for (IntrinsicsEstimate& row : rows) row.sigma = (row.sigma.array().square() + (row.fx * off).square()).sqrt();
@@ -205,7 +205,7 @@ void take_rows(const std::vector<SpanAnswer>& answers, const RotationLog& log, s
   }
 }
 
-/// The answer of the last span is that of the log; what could not be told apart in the log's is not of it.
+/// The last span's answer becomes that of the log; checks of separability in the whole log do not apply to it.
 void take_end(SpanAnswer& last, ObserveSolution& report) {
   std::erase_if(report.side_checks,
                 [](const Check& check) { return check.name == "separable" || check.name == "determined"; });
@@ -221,7 +221,7 @@ void take_end(SpanAnswer& last, ObserveSolution& report) {
   report = std::move(own);
 }
 
-/// Where the log does not end with such a span, what it ends with is as uncertain as its last row.
+/// If the log does not end with such a span, the final camera gets the σ of the last row.
 void widen_end(ObserveSolution& report) {
   const Eigen::Vector4d sigma = report.steps.back().sigma;
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {

@@ -38,7 +38,7 @@ void EliminatedRotations::add(const BundleObservation& seen, double weight, cons
 }
 
 void EliminatedRotations::solve() {
-  // A distance is a metre or more, if there is one.
+  // Prior of the third coordinate, inverse depth [1/m], if there is one: σ = 1/m, i.e. a metre or farther.
   for (NormalBlock& point : normal_.points) point.information(2, 2) += 1.0;
   slopes_ = slopes_by_common(normal_);
   normal_.crossings.clear();

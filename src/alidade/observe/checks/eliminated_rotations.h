@@ -7,38 +7,38 @@
 
 namespace alidade {
 
-/// Where each frame's rotation is estimated as well: how rotations and points of an adjustment follow other parameters,
-/// the columns of J. All are eliminated together, with the residuals' weights and the prior of the rotations.
+/// For adjustments with estimated rotations: how rotations and points follow changes of other parameters, the columns
+/// of J. All are eliminated together, with the weights of the residuals and the prior of the rotations.
 class EliminatedRotations {
  public:
   EliminatedRotations(const Adjustment& reference, Eigen::Index num_columns);
 
-  /// An observation's derivatives: by the columns, by its frame's rotation, by its point.
+  /// Adds the derivatives of an observation: by the columns, by the rotation of its frame, by its point.
   void add(const BundleObservation& seen, double weight, const Eigen::Ref<const Eigen::MatrixXd>& J,
            const Eigen::Matrix<double, 2, 3>& by_rotation, const Eigen::Matrix<double, 2, 3>& by_point);
-  /// After all of them.
+  /// To be called after the last add().
   void solve();
 
-  /// Derivatives of an observation by the columns, with its rotation and its point following.
+  /// Derivatives of an observation by the columns, with its rotation and its point eliminated.
   [[nodiscard]] Eigen::MatrixXd followed(const BundleObservation& seen, const Eigen::Ref<const Eigen::MatrixXd>& J,
                                          const Eigen::Matrix<double, 2, 3>& by_rotation,
                                          const Eigen::Matrix<double, 2, 3>& by_point) const;
-  /// What the prior of a frame's rotation adds to gradient and information of the columns.
+  /// Adds the contribution of a frame's rotation prior to gradient and information of the columns.
   void add_prior(int frame, Eigen::VectorXd& gradient, Eigen::MatrixXd& information) const;
-  /// Rotations can do all that this column does: nothing distinguishes them.
+  /// Whether rotations can reproduce the effect of this column entirely, so that it is unobservable.
   [[nodiscard]] bool is_absorbed(Eigen::Index column, double information) const;
 
  private:
   const BundleSolution& solution_;
-  BundleNormal normal_;    ///< Of the columns but for their own information, which is not needed.
-  BundleSlopes slopes_;    ///< How points and rotations follow the columns.
-  Eigen::VectorXd alone_;  ///< Information of each column if nothing followed it.
+  BundleNormal normal_;    ///< Of the columns, without their own information, which is not needed.
+  BundleSlopes slopes_;    ///< Change of points and rotations per unit of the columns.
+  Eigen::VectorXd alone_;  ///< Information of each column without elimination.
 };
 
-/// Each frame's rotation was estimated.
+/// Whether each frame's rotation was estimated.
 [[nodiscard]] bool has_rotations(const BundleSolution& solution);
 
-/// A frame with its rotation as estimated, where it was.
+/// The frame with its estimated rotation, if that was estimated.
 [[nodiscard]] RotationFrame rotated_frame(const Adjustment& reference, int frame);
 
 }  // namespace alidade

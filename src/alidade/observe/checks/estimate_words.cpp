@@ -5,7 +5,7 @@
 
 #include "alidade/observe/setup.h"
 
-// The words of `estimate`, and which causes of the residuals they are for, in one place.
+// The words of the option `estimate` and the causes of residuals they stand for, in one place.
 
 namespace alidade {
 namespace {
@@ -22,7 +22,7 @@ constexpr std::array<std::pair<const char*, bool ObserveNuisances::*>, 10> nuisa
      {"shutter", &ObserveNuisances::shutter},
      {"focal-drift", &ObserveNuisances::drift}}};
 
-/// Causes whose word is another.
+/// Causes whose word differs from the name of the cause.
 constexpr std::pair<const char*, const char*> cause_words[] = {{"scale", "encoder scale"},
                                                                {"scale", "scale of the rates"},
                                                                {"backlash", "backlash"},

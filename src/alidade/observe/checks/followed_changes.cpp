@@ -1,4 +1,4 @@
-// What the filter followed as a change of the intrinsics: was it one?
+// Checks whether a change of the intrinsics that the filter followed really was one.
 #include "alidade/observe/checks/followed_changes.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double clearly = 5.0;  // σ
 
-/// Rows that were rejected one after the other, between the last that was not and the next that was not.
+/// Consecutive rejected rows between two accepted ones, `before` and `after`.
 struct RejectedRun {
   std::size_t before = 0, begin = 0, after = 0;
   [[nodiscard]] std::size_t length() const { return after - begin; }
@@ -19,7 +19,7 @@ struct RejectedRun {
 
 bool is_taken_in(const IntrinsicsEstimate& row) { return row.has_value && row.event != ObserveEvent::burst; }
 
-/// No σ of a row that was rejected says where a change is: it is between the rows around it.
+/// The σ of rejected rows does not locate a change: it lies between the accepted rows around them.
 bool differ_clearly(const IntrinsicsEstimate& a, const IntrinsicsEstimate& b) {
   const Eigen::Array4d variance = a.sigma.array().square() + b.sigma.array().square();
   return ((a.values() - b.values()).array().square() > clearly * clearly * variance).any();
@@ -36,8 +36,8 @@ std::vector<RejectedRun> rejected_runs(const std::vector<IntrinsicsEstimate>& ro
   return runs;
 }
 
-/// Frames that neither the camera until then nor another explains, and another camera afterwards: no zoom begins so.
-/// (Of a zoom's frames the first is rejected and the second followed; after outliers the camera is what it was.)
+/// Frames that neither the old camera nor another explains, followed by another camera: no zoom begins like that.
+/// (In a zoom the first frame is rejected and the second followed; after outliers the camera is the same as before.)
 std::optional<Check> unexplained(const std::vector<IntrinsicsEstimate>& rows, const RotationLog& log) {
   constexpr std::size_t min_frames = 4;
   std::optional<RejectedRun> longest;
@@ -58,7 +58,7 @@ std::optional<Check> unexplained(const std::vector<IntrinsicsEstimate>& rows, co
                "residuals"};
 }
 
-/// A change of fx, fy, cx, cy that the filter followed: the last row before it and the first after it.
+/// A change of fx, fy, cx, cy that the filter followed: last row before it and first row after it.
 struct FollowedChange {
   std::size_t before = 0, after = 0;
 };
@@ -79,8 +79,8 @@ std::vector<FollowedChange> followed_changes(const std::vector<IntrinsicsEstimat
   return changes;
 }
 
-/// The centre of a lens that zooms moves by a few hundredths of the focal length's change, in Fang 2011 by as much: by
-/// far more it was bumped.
+/// In a zoom the principal point moves by a few hundredths of the change of the focal length, in Fang 2011 by the full
+/// change; if it moves much more, the camera was bumped.
 std::optional<Check> moved_centre(const std::vector<IntrinsicsEstimate>& rows, const RotationLog& log) {
   constexpr double most = 3.0;
   for (const FollowedChange& change : followed_changes(rows)) {
@@ -104,7 +104,7 @@ std::optional<Check> moved_centre(const std::vector<IntrinsicsEstimate>& rows, c
   return std::nullopt;
 }
 
-/// Rows between two changes that were followed: their innovations over what their σ would make them.
+/// Rows between two followed changes, with the squares of their innovations and the degrees of freedom.
 struct Span {
   std::size_t begin = 0, end = 0;
   double sum_nis = 0.0, sum_dof = 0.0;
@@ -125,9 +125,9 @@ std::vector<Span> spans_of(const std::vector<IntrinsicsEstimate>& rows) {
   return spans;
 }
 
-/// What changed with the intrinsics, and is none of them, stays in the residuals: from one change on they are larger.
+/// A change beside the intrinsics stays in the residuals: after one of the changes they are larger.
 std::optional<Check> worst_span(const std::vector<IntrinsicsEstimate>& rows, const RotationLog& log) {
-  constexpr double most = 1.25;  // of the variance elsewhere
+  constexpr double most = 1.25;  // over the variance elsewhere
   const std::vector<Span> spans = spans_of(rows);
   std::optional<Check> worst;
   for (std::size_t i = 1; i < spans.size(); ++i) {
@@ -160,7 +160,7 @@ std::optional<Check> worst_span(const std::vector<IntrinsicsEstimate>& rows, con
 
 void widen_before_zooms(std::vector<IntrinsicsEstimate>& rows) {
   constexpr std::size_t num_undecided = 2, num_unnoticed = 30;
-  constexpr double hardly_seen = 6.0;  // σ of one frame: a change of that is about what its χ² of 45 points rejects
+  constexpr double hardly_seen = 6.0;  // σ of one frame: about the change that its χ² test rejects, for 45 points
   std::optional<std::size_t> last;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (rows[k].event == ObserveEvent::zoom && last) {

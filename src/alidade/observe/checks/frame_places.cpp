@@ -19,13 +19,13 @@
 namespace alidade {
 namespace {
 
-constexpr int most_missing = 30;  // at a time
+constexpr int most_missing = 30;  // rows in one gap
 
-/// A measured rotation and its change; and how that of the image follows from it.
+/// A measured rotation and its change from row to row; and the linear map from it to the rotation of the image.
 using Turn = Eigen::Matrix<double, 6, 1>;
 using ImageByTurn = Eigen::Matrix<double, 3, 6>;
 
-/// From an image to the next that is another; none: too few points in common.
+/// From an image to the next different one; `image` is none if they have too few points in common.
 struct Step {
   std::size_t from = 0, to = 0;
   std::optional<ImageTurn> image;
@@ -92,7 +92,7 @@ class Places {
     return static_cast<std::size_t>(20 * num_even) >= 19 * gaps_s.size();
   }
 
-  /// As measured, in the camera's axes; none across what was not.
+  /// Measured rotation between two rows, in camera axes; none across rows that were not measured.
   [[nodiscard]] std::optional<Eigen::Vector3d> rotated(std::size_t from, std::size_t to) const {
     if (std::max(from, to) >= cam_from_start_.size() || segment_[from] != segment_[to] || !is_measured_[from] ||
         !is_measured_[to])
@@ -101,7 +101,7 @@ class Places {
     return log_so3(cam_from_start_[to] * cam_from_start_[from].conjugate());
   }
 
-  /// With how it changes from row to row, which a delay of less than a row adds.
+  /// The same with its change from row to row, by which a delay of less than a row acts.
   [[nodiscard]] std::optional<Turn> measured(std::size_t from, std::size_t to) const {
     if (to == from + 1 && from < next_turn_.size()) return next_turn_[from];
     const auto now = rotated(from, to);
@@ -113,9 +113,9 @@ class Places {
     return turn;
   }
 
-  /// The images that differ from the one before, and how; the same image again is no step.
+  /// Finds the images that differ from the one before, and by how much; an identical image is not a step.
   void note_steps() {
-    constexpr double still_px = 0.02;  // no finder puts points at the same hundredth in two images
+    constexpr double still_px = 0.02;  // no detector repeats its points to a hundredth of a pixel in two images
     std::size_t last = 0;
     for (std::size_t k = 1; k < log_.rows.size(); ++k) {
       const auto image = image_turn(log_.rows[last], log_.rows[k], centre_, focal_px_);
@@ -125,7 +125,7 @@ class Places {
     }
   }
 
-  /// How much later than in its own row each image was taken, and what the image shows of a rotation then.
+  /// Per image, how many rows after its own it was taken; and the fit of image rotation to measured rotation.
   struct Path {
     std::vector<int> later;
     ImageByTurn image_by_turn;
@@ -137,12 +137,12 @@ class Places {
     return Path{std::move(later), image_by_turn_, usual_};
   }
 
-  /// From the first so many images on, ever more: a fit to many misplaced ones is of none. Where it is theirs in part
-  /// its errors are large: gaps are sought as if they were half of it. A delay is known when the images are in their
-  /// rows.
+  /// Fits the first `first` images, then ever more: a fit to many misplaced images would be
+  /// wrong. As a fit to partly misplaced images has large errors, gaps are searched with
+  /// half of its typical error. The delay is estimated only when all images are placed.
   [[nodiscard]] std::optional<Path> placed_from(std::size_t first) {
     constexpr double longer = 1.2, much_longer = 1.6, ready = 0.5;
-    constexpr std::size_t many = 300;  // a fit to so many is hardly moved by those that are new
+    constexpr std::size_t many = 300;  // with so many images, the new ones hardly change the fit
     constexpr int passes = 4;
     std::vector<int> later(steps_.size() + 1, 0);
     for (auto longest = static_cast<double>(first);; longest *= longest < many ? longer : much_longer) {
@@ -161,7 +161,7 @@ class Places {
     return fitted(std::move(later));
   }
 
-  /// Each gap by itself, where a step is further by much more than others differ.
+  /// Places each gap separately, where the error of a step is far above the typical error.
   [[nodiscard]] std::optional<Path> placed_one_by_one() {
     std::vector<int> later(steps_.size() + 1, 0);
     for (int pass = 0; pass < 2; ++pass) {
@@ -171,7 +171,7 @@ class Places {
     return fitted(std::move(later));
   }
 
-  /// As many rows as explain most of it.
+  /// Number of missing rows that explains most of the step's error; 0 if none does.
   [[nodiscard]] int missing_before(const Step& step, int later) const {
     constexpr double much = 6.0, most = 0.5, seen_px = 0.3, explained = 0.25;
     const auto turn = measured(row(step.from, later), row(step.to, later));
@@ -191,7 +191,7 @@ class Places {
     return best;
   }
 
-  /// To the likeliest path of so many steps, where it is another.
+  /// Replaces the path by the likeliest one over the first `num` steps; returns whether it changed.
   [[nodiscard]] bool changes(std::vector<int>& later, std::size_t num) const {
     std::vector<int> again = likeliest_path(num);
     if (again == later) return false;
@@ -199,7 +199,7 @@ class Places {
     return true;
   }
 
-  /// What the image shows of a measured rotation: the mounting, and the focal length over the assumed one.
+  /// Fits the map from measured rotation to image rotation: the mounting, and focal length over the assumed one.
   [[nodiscard]] bool fit(const std::vector<int>& later, std::size_t num, bool knows_delay) {
     std::vector<Turn> from;
     std::vector<Eigen::Vector3d> to;
@@ -227,8 +227,8 @@ class Places {
     return true;
   }
 
-  /// Steps between images in rows of other times than theirs cost this much, in squares of the usual error; those
-  /// behind the end of the log as much as three times it. A gap is none that leaves few images behind it.
+  /// Cost of a step between images placed at the given offsets, in squares of the typical error; beyond the end of the
+  /// log, that of twice the typical error. None: a gap with too few images after it, or one that explains little.
   [[nodiscard]] std::optional<double> cost_of(const Step& step, int later_from, int later_to) const {
     constexpr double most = 100.0, outside = 4.0, fits = 3.0, explained = 0.3;
     constexpr std::size_t fewest_behind = 3;
@@ -257,7 +257,7 @@ class Places {
     return later > 0 ? gap : -inserted * later;
   }
 
-  /// A way to place the images until one of them: how many rows later than their own, at what cost, and from where.
+  /// Best path up to an image for one offset: its cost, and the offset of the image before.
   struct Way {
     double cost = 0.0;
     int from = 0;
@@ -269,7 +269,7 @@ class Places {
     if (!is_new && cost < at->second.cost) at->second = {cost, from};
   }
 
-  /// Goes on by a step: as before; behind an image that was inserted so many rows earlier; behind a gap later.
+  /// Extends all paths by one step: same offset; smaller after an inserted image; larger after a gap.
   [[nodiscard]] Ways next_ways(const Ways& ways, const Step& step) const {
     constexpr double open = 20.0, fits = 4.0, beam = 150.0, moves_px = 0.3;
     double least = std::numeric_limits<double>::infinity();
@@ -292,9 +292,9 @@ class Places {
     return next;
   }
 
-  /// How much later than in its own row each image was taken, the first and those behind each step: all of them
-  /// together, since a gap in which the camera hardly turns shows in the steps behind it only (A. J. Viterbi 1967). A
-  /// constant delay is none.
+  /// Number of rows by which each image is late, for the first image and after each step:
+  /// dynamic programming over all images, since a gap during which the camera hardly rotates
+  /// shows only in later steps (A. J. Viterbi 1967). A constant offset is allowed: a delay.
   [[nodiscard]] std::vector<int> likeliest_path(std::size_t num) const {
     constexpr int max_delay = 15;
     constexpr double delay_cost = 3.0;
@@ -307,7 +307,7 @@ class Places {
     return path;
   }
 
-  /// In words of rows: what is missing or there twice, the delay of the first image apart.
+  /// Converts the path to rows that are missing or repeated; the delay of the first image is subtracted.
   [[nodiscard]] FramePlaces places_of(const std::vector<int>& later) const {
     FramePlaces places;
     std::vector<int> own(log_.rows.size(), 0);
@@ -325,7 +325,7 @@ class Places {
     }
     const std::size_t last = steps_.empty() ? 0 : steps_.back().to;
     for (std::size_t k = last + 1; k < own.size(); ++k) own[k] = later.back() - later[0];
-    constexpr double far_px = 5.0;  // a head whose backlash is taken up moves less
+    constexpr double far_px = 5.0;  // a head that takes up its backlash moves less
     if (const auto turn = measured(row(last, later.back()), log_.rows.size() - 1); turn && places.missing.empty())
       if (focal_px_ * (image_by_turn_ * *turn).norm() > far_px)
         for (std::size_t k = last + 1; k < own.size(); ++k) places.repeated.push_back(k);
@@ -333,12 +333,12 @@ class Places {
     return places;
   }
 
-  /// The image behind the same ones has rotated as the camera did since the first of them, not since the last.
+  /// Whether the image after repeated ones has rotated as the camera did since the first of them, not since the last.
   [[nodiscard]] bool makes_up(const Step& step, int later_from, int later_to) const {
     const auto since_first = measured(row(step.from, later_from), row(step.to, later_to));
     const auto since_last = measured(row(step.to, later_to) - 1, row(step.to, later_to));
     const auto meanwhile = measured(row(step.from, later_from), row(step.to, later_to) - 1);
-    constexpr double moves_px = 0.3;  // pixels rounded to 0.1 px stay where they are while a head hardly turns
+    constexpr double moves_px = 0.3;  // pixels rounded to 0.1 px may stay the same while a head hardly rotates
     return step.image && since_first && since_last && meanwhile &&
            focal_px_ * (image_by_turn_ * *meanwhile).norm() > moves_px &&
            off_by(*step.image, *since_first) < 0.5 * off_by(*step.image, *since_last);
@@ -348,7 +348,7 @@ class Places {
     return (image.turn - image_by_turn_ * turn).norm();
   }
 
-  /// Beyond the log: a row that it has not.
+  /// May lie beyond the log, also for negative results, which wrap around.
   [[nodiscard]] static std::size_t row(std::size_t image, int later) {
     return image + static_cast<std::size_t>(static_cast<std::ptrdiff_t>(later));
   }
@@ -357,13 +357,13 @@ class Places {
   std::vector<Eigen::Quaterniond> cam_from_start_;
   std::vector<std::size_t> segment_;
   std::vector<bool> is_measured_;
-  std::vector<std::optional<Eigen::Vector3d>> next_;  ///< Rotation to the next row,
-  std::vector<std::optional<Turn>> next_turn_;        ///< with its change.
+  std::vector<std::optional<Eigen::Vector3d>> next_;  ///< Rotation to the next row.
+  std::vector<std::optional<Turn>> next_turn_;        ///< The same with its change.
   Eigen::Vector2d centre_ = Eigen::Vector2d::Zero();
   double focal_px_ = 1.0;
   ImageByTurn image_by_turn_ = ImageByTurn::Zero();
   std::vector<Step> steps_;
-  double usual_ = 0.0;  ///< By which a step's rotation differs.
+  double usual_ = 0.0;  ///< Typical (median) error of a step's rotation.
 };
 
 }  // namespace

@@ -8,31 +8,31 @@
 
 namespace alidade {
 
-/// Images that stand in a row of another time than theirs: frames were dropped before one and those behind numbered
-/// through, or a frame was taken once more for the next, or inserted once more and those behind it numbered on.
+/// Images stored in rows of another time than theirs: frames were dropped and the following ones numbered through, or a
+/// frame was repeated in place of the next one, or inserted a second time and the following ones numbered on.
 struct FramePlaces {
   struct Gap {
-    std::size_t before = 0;  ///< Row.
+    std::size_t before = 0;  ///< Row before which frames are missing.
     int num = 0;
   };
   std::vector<Gap> missing;
-  std::vector<std::size_t> repeated;  ///< Rows whose pixels are those of the row before.
-  int num_inserted = 0;               ///< Of these behind which the images are in a row too late.
-  std::vector<int> later;             ///< How many rows behind its own each image was taken; empty: none.
+  std::vector<std::size_t> repeated;  ///< Rows whose pixels repeat those of the row before.
+  int num_inserted = 0;               ///< Of these, inserted ones: the images after them are one row too late each.
+  std::vector<int> later;             ///< Per image: how many rows after its own it was taken; empty: all in place.
 
   [[nodiscard]] bool are_as_given() const { return missing.empty() && repeated.empty(); }
 };
 
-/// From the rotation between two images by all their points together, beside the measured one between their rows: at a
-/// gap it is that of some rows more, of a repeated image none, until the next makes up for it or, behind one that was
-/// inserted, does not. All images are placed together. As given where rows have no constant rate, or fewer than four
-/// points in common.
+/// Compares the rotation between two images, from all their points, with the measured one between
+/// their rows: at a gap it is that of several rows more; at a repeated image it is zero, until the
+/// next image makes up for it or, after an inserted one, does not. All images are placed jointly.
+/// Returns them as given if rows have no constant rate, or have fewer than four points in common.
 [[nodiscard]] FramePlaces frame_places(const RotationLog& log);
 
-/// The log with each image in the row of its time, repeated ones left out. Images behind its end have no row.
+/// The log with each image in the row of its time and repeated ones removed. Images beyond its end are dropped.
 [[nodiscard]] RotationLog placed(const RotationLog& log, const FramePlaces& places);
 
-/// By this name.
+/// Name of the check that places_check() returns.
 inline constexpr const char* frames_check = "frames";
 [[nodiscard]] Check places_check(const RotationLog& log, const FramePlaces& places);
 

@@ -9,20 +9,20 @@
 
 namespace alidade {
 
-/// The rotation of the image between two rows, over an assumed focal length, and how far points moved.
+/// The rotation of the image between two rows, for an assumed focal length, and how far the points moved.
 struct ImageTurn {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-  double moved_px = 0.0;  ///< Median.
+  double moved_px = 0.0;  ///< Median over the points.
 };
 
-/// The flow of points by a small rotation, as all but a few of them have it; none: fewer than four in common.
+/// Robust fit of a small rotation to the flow of the points; none: fewer than four points in common.
 [[nodiscard]] std::optional<ImageTurn> image_turn(const RotationRow& from, const RotationRow& to,
                                                   const Eigen::Vector2d& centre, double focal_px);
 
-/// Beyond twice the median an error counts by its size alone (P. J. Huber 1964).
+/// Huber weights: errors beyond twice the median count linearly (P. J. Huber 1964).
 void weigh_errors(const std::vector<double>& off, std::vector<double>& weights);
 
-/// Σ w J y by weighted least squares, where all of it is determined.
+/// Solves the normal equations A x = b with slight damping, so that undetermined directions stay zero.
 template <int Num>
 Eigen::Matrix<double, Num, 1> solved(const Eigen::Matrix<double, Num, Num>& A, const Eigen::Matrix<double, Num, 1>& b) {
   constexpr double hardly = 1e-9;

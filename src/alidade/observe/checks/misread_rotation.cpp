@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-/// A way to misread angles, rates or attitudes, and what to say where the pixels fit once it is undone.
+/// A way to misread angles, rates or attitudes, and the advice if the pixels fit once it is undone.
 struct Misreading {
   const char* words;
   std::function<void(RotationRow&)> undo;
@@ -67,10 +67,10 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
 
 constexpr std::size_t max_frames = 150;
 
-/// Noise [px] with which the log is explained, by the rows of its first seconds, thinned; infinite: not at all.
+/// Noise [px] with which the thinned rows of the first seconds are explained; infinite if they are not explained.
 struct Explanation {
   double noise_px = std::numeric_limits<double>::infinity();
-  bool tells = false;  ///< The focal lengths, too: what determines nothing is explained by any reading.
+  bool tells = false;  ///< Whether the focal lengths are determined: otherwise any reading explains the log.
 };
 
 Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale,
@@ -89,20 +89,20 @@ Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, c
   AdjustConfig adjust_with;
   adjust_with.start = start_camera(config, scale);
   adjust_with.other_starts = {0.7, 2.5, 5.0, 10.0};
-  adjust_with.max_iterations = 20;  // a wrong reading has no bottom to reach
+  adjust_with.max_iterations = 20;  // with a wrong reading the cost has no minimum to reach
   adjust_with.reject = false;
   const Adjustment adjustment = adjust(buffer, adjust_with, progress);
   if (!adjustment.has_value) return {};
-  constexpr double most = 0.05;  // σ over the focal length, as an answer may have it
+  constexpr double most = 0.05;  // σ over the focal length that is acceptable in an answer
   const Eigen::Vector2d variance = CommonMatrix(adjustment.solution.bound()).diagonal().head<2>();
   const Eigen::Vector2d focal = adjustment.solution.camera.k.head<2>();
   const bool tells = (variance.array() > 0.0).all() && (variance.array().sqrt() < most * focal.array()).all();
   return {adjustment.solution.rms_px * scale.scale, tells};
 }
 
-/// Turns so small, or about one axis only, determine nothing however they are read.
+/// Very small rotations, or rotations about one axis only, determine nothing however they are read.
 bool motion_suffices(const ObserveMotion& motion) {
-  constexpr double min_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not rotate
+  constexpr double min_rad = 3.0 * degree, little = 0.02;  // share of the largest: below it, the axis did not rotate
   return motion.span_rad >= min_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
 }
 
@@ -121,7 +121,7 @@ bool may_be_misread(const ObserveSolution& report) {
   const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
   if (!has_answer) return motion_suffices(report.motion);
   if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
-  // What is freed until nothing is asked for may determine nothing any more.
+  // With causes estimated until none is indicated, the focal length may no longer be determined.
   constexpr double vague = 0.05;
   for (const std::size_t axis : {0U, 1U})
     if (report.status == Status::ok && report.quantities[axis].sigma > vague * report.quantities[axis].value)
@@ -139,9 +139,9 @@ Misread misread_rotation(const RotationLog& log, const ObserveSetup& config, con
                          const Progress& progress) {
   if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return {.is_sought = true};
   constexpr double max_px = 3.0, clearly = 0.3;            // of the noise as the log is read
-  constexpr double ordinary_px = 1.0, beyond_doubt = 0.1;  // no cause is tried beside it
-  // An explanation knows no distortion and no mounting: what the solution explains with them is explained as it is
-  // read.
+  constexpr double ordinary_px = 1.0, beyond_doubt = 0.1;  // then no other cause is tried
+  // explanation_of() estimates neither distortion nor mounting: if the solution explains the log with these, its noise
+  // counts as that of the log as read.
   const bool is_explained = report.status == ObserveSolution::Status::ok && !rejects_many(report);
   const double as_read = std::min(explanation_of(log, config, report.scale, progress).noise_px,
                                   is_explained ? report.sigma_px : std::numeric_limits<double>::infinity());

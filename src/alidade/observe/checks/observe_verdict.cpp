@@ -15,12 +15,12 @@ namespace {
 
 constexpr double fine = 0.003;  // σ over the focal length of a converged estimate
 
-/// What the log does not determine and why, for who rotated the camera; and what to add.
+/// What the log does not determine, and why, depending on who rotated the camera; and what to add.
 struct Reason {
   std::string name, what, add;
 };
 
-/// The angle that the longer side of the image spans; none: the focal length is not known well enough to say.
+/// The field of view along the longer side of the image [rad]; none if the focal length is not known well enough.
 std::optional<double> field_rad(const ObserveSolution& report) {
   constexpr double known_share = 0.1;
   if (report.quantities.empty()) return std::nullopt;
@@ -29,7 +29,7 @@ std::optional<double> field_rad(const ObserveSolution& report) {
   return 2.0 * std::atan(0.5 * std::max(report.width_px, report.height_px) / f.value);
 }
 
-/// A view through a long lens: its parts all rotate alike, wherever the axis meets the image.
+/// A narrow field of view: all its parts move alike, wherever the rotation axis meets the image.
 std::optional<Reason> narrow_field(const ObserveSolution& report, const ObserveSetup& config) {
   constexpr double min_share = 0.2;
   const std::optional<double> field = field_rad(report);
@@ -42,9 +42,9 @@ std::optional<Reason> narrow_field(const ObserveSolution& report, const ObserveS
 }
 
 Reason reason_of(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
-  const Eigen::Vector3d& path = report.motion.path_rad;  // about x: tilt; y: pan; z: roll
+  const Eigen::Vector3d& path = report.motion.path_rad;  // rotation about x: tilt; y: pan; z: roll
   const double most = path.maxCoeff();
-  constexpr double little = 0.02;  // of the largest: an axis that did not rotate
+  constexpr double little = 0.02;  // share of the largest: below it, the axis did not rotate
   if (log.num_points == 0 || report.rows_used < 3) {
     return {"too few points", "too few points: " + std::to_string(report.rows_used) + " rows see any",
             "track at least one point through the rotation, better four"};
@@ -78,7 +78,7 @@ Reason reason_of(const ObserveSolution& report, const RotationLog& log, const Ob
   return {"weak motion", "the motion is too weak for the noise", "rotate farther, longer, or track more points"};
 }
 
-/// The worst-known combination of fx, fy, cx, cy: its σ [px] and its name.
+/// The worst determined combination of fx, fy, cx, cy: its σ [px] and its name.
 Check weakest(const ObserveSolution& report) {
   Check check{"weakest combination", State::good, "", 0.0, 0.0, "px", "excitation"};
   const double s = report.scale.scale;
@@ -110,7 +110,7 @@ void add_checks(const ObserveSolution& report, Verdict& verdict) {
   verdict.checks.push_back(weakest(report));
   const double f_sigma = std::max(report.quantities[0].sigma / report.quantities[0].value,
                                   report.quantities[1].sigma / report.quantities[1].value);
-  constexpr double none = 0.05;  // no answer to rest on
+  constexpr double none = 0.05;  // no usable answer
   verdict.checks.push_back({"focal length",
                             f_sigma < fine   ? State::good
                             : f_sigma < none ? State::care
@@ -157,7 +157,7 @@ Verdict fang_refusal(const ObserveSolution& report, const RotationLog& log, cons
   return verdict;
 }
 
-/// A lens looks at about the centre of its image: images of another size than the one given, or cropped, it does not.
+/// The principal point is near the centre of the image, unless the image has another size than given, or is cropped.
 void add_size_check(const ObserveSolution& report, const ObserveSetup& config, Verdict& verdict) {
   constexpr double most = 0.1, clearly = 5.0;
   if (config.width_px <= 0 || config.fixed_centre) return;
@@ -182,7 +182,7 @@ void add_size_check(const ObserveSolution& report, const ObserveSetup& config, V
                             .unit = "%"});
 }
 
-/// A scale that no instrument has was not measured with an error, but read in another way.
+/// A scale that no instrument has is not an error of measurement: the angles have another meaning.
 void add_scale_check(const ObserveSolution& report, Verdict& verdict) {
   constexpr double most = 0.1;
   for (const ObservedQuantity& quantity : report.quantities) {
@@ -200,7 +200,7 @@ void add_scale_check(const ObserveSolution& report, Verdict& verdict) {
   }
 }
 
-/// Why there is no estimate, in a verdict; none where there is one.
+/// Why there is no estimate, as a verdict; none if there is an estimate.
 std::optional<Verdict> refusal_of(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
   using Status = ObserveSolution::Status;
   if (report.status == Status::unobservable || report.status == Status::too_few_data) {
@@ -222,7 +222,7 @@ std::optional<Verdict> refusal_of(const ObserveSolution& report, const RotationL
                    ExitCode::undetermined);
   }
   if (report.status == Status::no_convergence) {
-    // An adjustment that finds no bottom, on a log that is degenerate anyway.
+    // The adjustment found no minimum, on a log that is degenerate anyway.
     const Reason reason = reason_of(report, log, config);
     if (reason.name != "weak motion") {
       return refusal(reason.what, reason.add, ExitCode::undetermined);
@@ -242,14 +242,14 @@ std::optional<Verdict> refusal_of(const ObserveSolution& report, const RotationL
   return std::nullopt;
 }
 
-/// "fx 700.1 ± 0.5 px, fy …", 3σ.
+/// "fx 700.1 ± 0.5 px, fy …", with 3σ.
 std::string sentence_of(const ObserveSolution& report) {
   const ObservedQuantity &fx = report.quantities[0], &fy = report.quantities[1];
   return "fx " + text_of(fx.value, 5) + " ± " + text_of(3.0 * fx.sigma, 2) + " px, fy " + text_of(fy.value, 5) + " ± " +
          text_of(3.0 * fy.sigma, 2) + " px (3σ) from " + std::to_string(report.rows_used) + " rows";
 }
 
-/// The state of the worst check, and its text as what to add.
+/// Takes the state of the worst check, and its text as what to add.
 void adopt_worst_check(Verdict& verdict) {
   for (const Check& check : verdict.checks) {
     const bool speaks = check.state == State::care || check.state == State::bad;
@@ -259,10 +259,10 @@ void adopt_worst_check(Verdict& verdict) {
   }
 }
 
-/// The advice of more specific checks first: images in rows of other times, a cause, the rotation's noise; and the
-/// check of a misread rotation.
+/// Advice from the more specific checks first: misplaced images, a cause, noise of the rotation; and the check for a
+/// misread rotation.
 void add_advice(const ObserveSolution& report, Verdict& verdict) {
-  // A σ that is too large follows from a cause, and is none itself.
+  // A large σ of the focal length is a consequence, not a cause.
   const bool has_other = std::ranges::any_of(
       verdict.checks, [](const Check& check) { return check.state == State::bad && check.name != "focal length"; });
   const bool may_advise = verdict.state == State::care || (verdict.state == State::bad && !has_other);

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Where images are in rows ever later at a steady rate: by how much of the time; 0 elsewhere.
+/// Rate at which images become ever later (rows per row), if it is steady; otherwise 0.
 double steady_lateness(const FramePlaces& places) {
   constexpr int fewest = 3;
   constexpr double most_rows = 2.0;

@@ -8,11 +8,11 @@
 namespace alidade {
 namespace {
 
-constexpr double max_ordinary_px = 2.0, max_possible_px = 6.0;  // noise of a point finder
-constexpr double many_rejected = 0.2, max_rejected = 0.4;       // share of what was seen
-constexpr double moves_beyond = 4.0;                            // of a track's residuals over the others' median
+constexpr double max_ordinary_px = 2.0, max_possible_px = 6.0;  // noise of a point detector
+constexpr double many_rejected = 0.2, max_rejected = 0.4;       // share of the observations
+constexpr double moves_beyond = 4.0;                            // a track's RMS over the median of the others
 
-/// Asked for, the one that explains best first.
+/// The indicated causes, the one that explains best first.
 std::vector<const CauseScore*> asked_for(const ObserveSolution& report) {
   std::vector<const CauseScore*> asked;
   for (const CauseScore& cause : report.causes) {
@@ -23,7 +23,7 @@ std::vector<const CauseScore*> asked_for(const ObserveSolution& report) {
   return asked;
 }
 
-/// "k1 −0.1", or the largest of several over its σ.
+/// "k1 −0.1"; of several members the one that is largest over its σ.
 std::string size_of(const CauseScore& cause) {
   const auto worst =
       std::max_element(cause.members.begin(), cause.members.end(), [](const CauseMember& a, const CauseMember& b) {
@@ -72,7 +72,7 @@ Check rejected_check(const ObserveSolution& report) {
   return check;
 }
 
-/// Tracks whose residuals are far larger than the others'.
+/// Check for tracks whose residuals are far larger than those of the others: moving points.
 Check points_check(const ObserveSolution& report) {
   const Adjustment& reference = report.reference;
   const std::size_t num = reference.bundle.points.size();
@@ -116,9 +116,9 @@ Check reference_check(const ObserveSolution& report) {
   return check;
 }
 
-/// How much of σ is what lasts in the tracks, and how well that can be counted.
+/// Ratio of σ with errors that last along the tracks to the model's, and whether it can be estimated well.
 Check lasting_check(const ObserveSolution& report) {
-  constexpr double most = 12.0;  // beyond it the errors last about as long as the log
+  constexpr double most = 12.0;  // above it, the errors last about as long as the log
   const StatedCovariance& stated = report.stated;
   const auto count = std::min(stated.lasting.rows(), report.reference.solution.information.rows());
   Check check{"errors last", State::good, "", 1.0, most, "", "residuals"};
@@ -134,7 +134,7 @@ Check lasting_check(const ObserveSolution& report) {
   return check;
 }
 
-/// Of a camera that was rotated on its mount by so much.
+/// Check of a camera that was rotated on its mount.
 Check step_check(const MountingStep& step) {
   const double angle_deg = step.rotation_rad.norm() / degree;
   return {std::string("needs ") + step_cause,
@@ -147,7 +147,7 @@ Check step_check(const MountingStep& step) {
           "residuals"};
 }
 
-/// Do the residuals of a frame rotate together? An encoder's or a gyroscope's noise, which every row has again.
+/// Whether the residuals of a frame rotate together: noise of an encoder or gyroscope, independent from row to row.
 Check jitter_check(const ObserveSolution& report) {
   const RotationJitter& jitter = report.jitter;
   const double sigma_rad = jitter.noise_rad();
@@ -166,8 +166,8 @@ Check jitter_check(const ObserveSolution& report) {
   return check;
 }
 
-/// Are the estimated rotations as far from the measured ones as their σ says? Of an information Λ measured and F seen
-/// an error of σ is estimated as its share s = F/(F + Λ), beside s²/F of the pixels: σ² = Σ(ε² − s²/F) / Σs².
+/// Whether the estimated rotations differ from the measured ones as their σ predicts. With information Λ measured and F
+/// from pixels, an error is estimated with gain s = F/(F + Λ) and pixel noise s²/F: σ² = Σ(ε² − s²/F) / Σs².
 std::optional<Check> turn_noise_check(const BundleSolution& solution) {
   constexpr double max_ratio = 1.3, chance = 5.0;
   double squares = 0.0, weight = 0.0, sum_sigma = 0.0;
@@ -197,7 +197,7 @@ std::optional<Check> turn_noise_check(const BundleSolution& solution) {
 
 namespace {
 
-/// Half a turn about x undoes a pan of the other sign, and an image that is mirrored left to right, and so on.
+/// Half a turn about x compensates a pan of opposite sign or an image mirrored left to right; other axes likewise.
 std::string half_turn_words(const Eigen::Vector3d& mount_rad) {
   const Eigen::Vector3d axis = mount_rad.cwiseAbs() / mount_rad.norm();
   constexpr double along = 0.95;

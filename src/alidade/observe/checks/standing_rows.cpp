@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t fewest_rows = 5;
 
-/// Where the camera looked in each row, as measured.
+/// The measured orientation of the camera in each row.
 class Looks {
  public:
   explicit Looks(const RotationLog& log) : log_(log) {
@@ -23,7 +23,7 @@ class Looks {
     for (const RotationRow& row : log.rows) frames_.push_back(reader.next(row));
   }
 
-  /// Whether it still looks where it did in the first of them, and most points are where they were.
+  /// Whether the camera has the same orientation as in row `first`, and most points have not moved.
   [[nodiscard]] bool stands(std::size_t first, std::size_t row) const {
     constexpr double near_rad = 0.1 * degree, near_px = 1.0;
     const RotationFrame &before = frames_[first], &now = frames_[row];
@@ -40,7 +40,7 @@ class Looks {
   std::vector<RotationFrame> frames_;
 };
 
-/// A coordinate of a point over a stop; none where it was not seen.
+/// One coordinate of a point over a stop, without rows in which it was not seen.
 std::vector<double> track_of(const RotationLog& log, const Stop& stop, std::size_t point, Eigen::Index axis) {
   std::vector<double> track;
   for (std::size_t k = stop.begin; k < stop.end; ++k)
@@ -63,7 +63,7 @@ double sigma_within(const RotationLog& log, const std::vector<Stop>& stops) {
   return normal_from_mad * median_of(std::move(off));
 }
 
-/// An image of all rows of a stop.
+/// One row that averages all rows of a stop.
 RotationRow averaged(const RotationLog& log, const Stop& stop) {
   RotationRow row = log.rows[stop.middle()];
   if (log.source == RotationSource::head) {
@@ -111,7 +111,7 @@ RotationLog with_each_stop_once(const RotationLog& log, const StandingRows& stan
 }
 
 double shared_within_stops(const ObserveSolution& each_once, const RotationLog& log, const StandingRows& standing) {
-  constexpr double of_median = 0.5 * std::numbers::pi;  // its variance over the mean's
+  constexpr double of_median = 0.5 * std::numbers::pi;  // variance of the median over that of the mean
   const Adjustment& reference = each_once.reference;
   double squares = 0.0, of_own = 0.0, num = 0.0;
   for (std::size_t i = 0; i < reference.bundle.observations.size(); ++i) {

@@ -20,18 +20,18 @@ constexpr std::size_t tracks_looked_at = 64;
 struct Part {
   explicit Part(Eigen::Index n = 0) : gradient(VectorXd::Zero(n)), information(MatrixXd::Zero(n, n)) {}
   VectorXd gradient;
-  MatrixXd information;  ///< Of a block: the covariance of its score, with what lasts along the tracks.
+  MatrixXd information;  ///< Of a block: covariance of its score, with errors that last along tracks.
 };
 
-/// Scores of a track if errors last as they do: Σ over earlier pixels of exp(−Δt/τ) Jᵀw.
+/// Decayed sum of a track's earlier scores, for exponentially correlated errors: Σ exp(−Δt/τ) Jᵀw.
 struct Memory {
-  MatrixXd of_all, of_block;  ///< n × 2; of the block of now alone.
+  MatrixXd of_all, of_block;  ///< n × 2; `of_block` since the start of the current block.
   double t_s = 0.0;
 };
 
 struct Parts {
   std::vector<Part> blocks, tracks;
-  MatrixXd lasting;  ///< Covariance of the whole score, with what lasts along the tracks.
+  MatrixXd lasting;  ///< Covariance of the whole score, with errors that last along the tracks.
 };
 
 double duration_of(const Adjustment& reference) {
@@ -39,7 +39,7 @@ double duration_of(const Adjustment& reference) {
   return frames.empty() ? 0.0 : frames.back().t_s - frames.front().t_s;
 }
 
-/// A pixel's score, with those before it that its errors share; `half` · noise is the score.
+/// Adds the covariance of a pixel's score with the earlier ones of its track; `half` · unit noise is the score.
 void add_lasting(const MatrixXd& half, double now_s, const LastingErrors& errors, Memory& before, MatrixXd& all,
                  MatrixXd& of_block) {
   const double fade = std::exp(-(now_s - before.t_s) / errors.seconds);
@@ -54,7 +54,7 @@ void add_lasting(const MatrixXd& half, double now_s, const LastingErrors& errors
   before.of_block += half;
 }
 
-/// Each observation of a reference with its derivatives by the shared parameters, all else following.
+/// The derivatives of each observation by the shared parameters, with points and rotations eliminated.
 class Derivatives {
  public:
   Derivatives(const Adjustment& reference, const ObserveNuisances& nuisances)
@@ -71,7 +71,7 @@ class Derivatives {
 
   [[nodiscard]] Eigen::Index size() const { return layout_.size; }
   [[nodiscard]] const std::optional<EliminatedRotations>& rotations() const { return rotations_; }
-  /// J and the prediction minus the pixel. False: it has no pixel.
+  /// J, and prediction minus pixel. False: the point has no pixel.
   bool at(std::size_t i, MatrixXd& J, Eigen::Vector2d& error) {
     if (!predict(i)) return false;
     const BundleObservation& seen = reference_.bundle.observations[i];
@@ -104,7 +104,7 @@ class Derivatives {
   int frame_ = -1;
 };
 
-/// What is known of the rotations counts as one more measurement each.
+/// The prior of each rotation counts as one more measurement.
 void add_rotations(const EliminatedRotations& rotations, const std::vector<int>& block_of_frame, Parts& parts) {
   for (std::size_t k = 0; k < block_of_frame.size(); ++k) {
     Part& block = parts.blocks[static_cast<std::size_t>(block_of_frame[k])];
@@ -158,7 +158,7 @@ MatrixXd made_positive(const MatrixXd& symmetric) {
   return eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }
 
-/// What the tracks share beyond what lasts in them, where the model's covariance is 1; `lasting` of their scores.
+/// Covariance shared along tracks beyond that of lasting errors, with the model whitened; `lasting`: of the scores.
 MatrixXd track_excess(const Parts& parts, const MatrixXd& lasting, const MatrixXd& L, StatedCovariance& stated) {
   const Eigen::Index n = L.rows();
   MatrixXd tracks = MatrixXd::Zero(n, n);
@@ -177,7 +177,7 @@ MatrixXd track_excess(const Parts& parts, const MatrixXd& lasting, const MatrixX
   return stated.counts_tracks ? MatrixXd(by_track - expected) : none;
 }
 
-/// Σ r(t)·r(t + lag) over the tracks, by the lag; what lies beyond Huber's limit is drawn in.
+/// Σ r(t)·r(t + lag) over the tracks, per lag; residuals beyond Huber's limit are shortened to it.
 std::vector<double> products_by_lag(const Adjustment& reference) {
   const RotationBundle& bundle = reference.bundle;
   const std::size_t every = std::max<std::size_t>(1, bundle.points.size() / tracks_looked_at);
@@ -195,15 +195,15 @@ std::vector<double> products_by_lag(const Adjustment& reference) {
       for (std::size_t k = lag; k < track.size(); ++k) product[lag] += track[k].dot(track[k - lag]);
     }
     if (product[lag] < 0.0) {
-      product.resize(lag);  // beyond the first lag without correlation there is none to be summed
+      product.resize(lag);  // no sum beyond the first lag without correlation
       break;
     }
   }
   return product;
 }
 
-/// τ [frames] for which Σ k exp(−k/τ) / Σ exp(−k/τ), k = 1 … last, is `mean_lag`: whatever share of the noise does not
-/// last. At most `last`: correlations of a longer one would not have ended there.
+/// τ [frames] for which Σ k exp(−k/τ) / Σ exp(−k/τ), k = 1 … last, equals `mean_lag`; independent of the share of the
+/// noise that lasts. At most `last`: a longer correlation would not have ended there.
 double lasting_frames(double mean_lag, double last) {
   const auto mean_for = [last](double tau) {
     double sum = 0.0, lag_sum = 0.0;
@@ -240,7 +240,7 @@ LastingErrors lasting_errors(const Adjustment& reference) {
   const std::vector<double> product = products_by_lag(reference);
   const auto num_frames = static_cast<double>(reference.bundle.frames.size());
   if (product.size() < 2 || !(product[0] > 0.0)) return {};
-  // A point's bearing takes the mean of its track's errors with it: all products lose that mean's variance.
+  // The bearing of a point absorbs the mean error of its track: all products lose the variance of that mean.
   double lost = 0.0, lag_sum = 0.0, sum = 0.0, last = 0.0;
   constexpr int rounds = 20;
   for (int round = 0; round < rounds; ++round) {
@@ -284,7 +284,7 @@ StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNui
   if (num_blocks < 3 || !llt.is_positive()) return stated;
   stated.block_s = duration_s / num_blocks;
   const Parts parts = parts_of(reference, nuisances, num_blocks, errors);
-  // Of the noise, than the residuals show: what the bearings take of white noise is counted already.
+  // Noise over that of the residuals: what the bearings absorb of white noise is already counted in the dof.
   const double counted = 1.0 / static_cast<double>(reference.bundle.frames.size());
   const double more = errors.share > 0.0 ? std::max(1.0, (1.0 - counted) / (1.0 - errors.lost)) : 1.0;
   const MatrixXd prior = reference.solution.prior_information;

@@ -11,25 +11,25 @@ namespace {
 
 constexpr const char* const quantity_names[] = {"fx", "fy", "cx", "cy"};
 
-/// How errors of a cause that is not given a σ of ordinarily are.
+/// Typical errors of a cause for which no σ is given.
 struct Given {
   std::string cause;
   double ordinary;
   std::optional<double> ObserveSetup::*config_sigma;
   const char* remedy;
-  bool is_counted = false;  ///< Where no σ is given: as it ordinarily is, less what the residuals say.
-  double as_scale = 0.0;    ///< σ of the scale of the rotation that one unit of it is, over the angles of a log.
-  double least = 0.0;       ///< No instrument is known better: where less is given, the residuals are asked for this.
+  bool is_counted = false;  ///< If no σ is given: count the typical size, as far as the residuals allow it.
+  double as_scale = 0.0;  ///< σ of the scale of the rotation to which one unit corresponds, over the angles of a log.
+  double least = 0.0;     ///< No instrument is better: below it, the residuals limit an error of this size.
 };
 
 constexpr double ordinary_scale = 0.005, ordinary_mount_rad = 0.5 * degree, ordinary_delay_s = 0.01,
                  ordinary_parallax = 0.002,  // 1 cm at 5 m
     ordinary_k1 = 0.02, ordinary_centre_px = 2.0, ordinary_curve_rad = 0.05 * degree,
-                 ordinary_clock_rate = 0.001;  // 29.97 frames a second taken for 30
+                 ordinary_clock_rate = 0.001;  // 29.97 frames per second mistaken for 30
 constexpr const char* clock_cause = "clock rate";
 constexpr const char* curve_cause = "error of the angles within a turn";
-constexpr double bend_of_rates = 0.001;        // a gyroscope's scale differs so much from rate to rate
-const double slope_of_waves = std::sqrt(5.0);  // once and twice a turn, sine and cosine
+constexpr double bend_of_rates = 0.001;        // the scale of a gyroscope varies that much with the rate
+const double slope_of_waves = std::sqrt(5.0);  // once and twice per revolution, sine and cosine
 
 const std::vector<Given>& givens() {
   static const std::vector<Given> all{
@@ -49,7 +49,7 @@ const std::vector<Given>& givens() {
   return all;
 }
 
-/// A log with its truth whose scale and centre are exact comes from a simulator: so is all that it does not say.
+/// A log with a truth whose scale and centre are exact comes from a simulator: all else that it omits is exact as well.
 bool is_exact(const RotationLog& log) {
   return !log.truth.empty() && log.sigma_scale == 0.0 && log.sigma_parallax == 0.0;
 }
@@ -61,7 +61,7 @@ std::optional<double> given_sigma(const Given& given, const RotationLog& log, co
   return is_exact(log) ? std::optional(0.0) : std::nullopt;
 }
 
-/// Over so few degrees a wave of a turn is a straight line, another scale of the angles: that is listed already.
+/// Over so few degrees, a wave of one period per revolution is a straight line: an error of scale, listed already.
 bool is_straight_line(const RotationLog& log) {
   constexpr double short_rad = 0.1;
   if (log.source != RotationSource::head || log.rows.empty()) return false;
@@ -73,7 +73,7 @@ bool is_straight_line(const RotationLog& log) {
   return (high - low).maxCoeff() < short_rad;
 }
 
-/// What there ordinarily is of it beside the scale: of that a σ that is given counts as much already.
+/// Typical size beyond the error of scale, which a given σ of the scale covers already.
 double ordinary_beside_scale(const Given& given, const RotationLog& log, const ObserveSetup& config) {
   const bool is_scale = given.as_scale > 0.0 && (given.cause != clock_cause || log.source == RotationSource::rate);
   if (!is_scale) return given.ordinary;
@@ -86,7 +86,7 @@ std::string full_name(const std::string& cause, const CauseMember& member) {
   return cause + " " + member.name;
 }
 
-/// fx, fy, cx, cy moved by so much.
+/// Fills in the effect of moving fx, fy, cx, cy by `move`.
 void fill_effect(const Eigen::Vector4d& move, const Eigen::Vector4d& sigma, double scale, Assumption& assumption) {
   Eigen::Index worst = 0;
   assumption.moves = move.cwiseAbs().cwiseQuotient(sigma).maxCoeff(&worst);
@@ -94,13 +94,13 @@ void fill_effect(const Eigen::Vector4d& move, const Eigen::Vector4d& sigma, doub
   assumption.moved_by = std::abs(move[worst]) * scale;
 }
 
-/// A lever shows as one parallax along the view that all points have: what only some have, the residuals show.
+/// A lever appears as one parallax along the view common to all points; parallax of some points shows in the residuals.
 std::size_t first_member(const std::string& cause) { return cause == "lever" ? 2 : 0; }
 std::size_t end_member(const CauseScore& cause) {
   return cause.name == "lever" ? std::min<std::size_t>(3, cause.members.size()) : cause.members.size();
 }
 
-/// Adds what an error of a cause, as it ordinarily is and as these residuals let it be, does to the parameters.
+/// Adds the effect on the parameters of a typical error of the cause, as far as these residuals allow it.
 void count_ordinary(const CauseScore& cause, double ordinary, CommonMatrix& cov) {
   const auto m = static_cast<Eigen::Index>(cause.members.size()), n = cause.members.front().moves.size();
   if (n > cov.rows() || cause.information.rows() != m) return;
@@ -113,7 +113,7 @@ void count_ordinary(const CauseScore& cause, double ordinary, CommonMatrix& cov)
   const Eigen::MatrixXd before = Eigen::MatrixXd::Identity(m, m) / (ordinary * ordinary);
   const Eigen::MatrixXd left = inverse_symmetric(cause.information + before);
   Eigen::MatrixXd scatter = moves * left * moves.transpose();
-  // What they ask for, though by less than chance allows, is not beyond what may be there.
+  // The error that the residuals indicate, though within chance, is certainly possible.
   const Eigen::VectorXd asked = moves * (left * (cause.information * value));
   constexpr double hardly = 2.0;
   if (cause.z > hardly) scatter += asked * asked.transpose();
@@ -125,7 +125,7 @@ void count_given(const CauseMember& member, double sigma, CommonMatrix& cov) {
   if (n <= cov.rows()) cov.topLeftCorner(n, n) += sigma * sigma * member.moves * member.moves.transpose();
 }
 
-/// What the residuals ask for, but not so that it is freed: the answer may be off by as much.
+/// Causes that the residuals indicate, but not enough to be estimated: the answer may be off by their effect.
 void count_asked(const ObserveSolution& report, CommonMatrix& cov) {
   constexpr double hardly = 3.0;
   for (const CauseScore& cause : report.causes) {
@@ -135,7 +135,7 @@ void count_asked(const ObserveSolution& report, CommonMatrix& cov) {
   }
 }
 
-/// fx and fy follow a centre that is fixed where it is not.
+/// Effect on fx and fy of fixing the principal point at a wrong place.
 void add_fixed_centre(const ObserveSetup& config, const ObserveSolution& report, const Eigen::Vector4d& sigma,
                       std::vector<Assumption>& assumed) {
   if (!config.fixed_centre) return;
@@ -156,7 +156,7 @@ void add_fixed_centre(const ObserveSetup& config, const ObserveSolution& report,
   }
 }
 
-/// One row for what a lens that zooms changes beside its focal length and centre. It has no say in the verdict.
+/// One row for the changes of a zoom lens beside focal length and principal point. It does not affect the verdict.
 void add_zoomed_lens(const ObserveSolution& report, std::vector<Assumption>& assumed) {
   constexpr double clearly_zoomed = 1.02;
   double least = std::numeric_limits<double>::infinity(), most = 0.0;

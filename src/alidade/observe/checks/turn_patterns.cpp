@@ -10,14 +10,14 @@
 namespace alidade {
 namespace {
 
-// σ of what ordinary instruments have. Encoders: cheap servos; rates: gyroscopes of phones.
+// Typical σ of instruments. Encoders: cheap servos; rates: gyroscopes of phones.
 constexpr double instrument_scale = 0.02, instrument_backlash_rad = 0.5 * degree, instrument_curve_rad = 0.3 * degree,
                  instrument_zero_drift = 1e-3, instrument_bias = 0.01, instrument_clock_rate = 1e-3,
                  instrument_skew_rad = 0.2 * degree;
 
 using Rows = std::span<RotationRow>;
 
-/// The rows without their pixels.
+/// The log's rows without their pixels.
 RotationLog bare(const RotationLog& log) {
   RotationLog copy;
   copy.source = log.source;
@@ -40,11 +40,11 @@ std::vector<Eigen::Quaterniond> turned_since_start(const RotationLog& log, doubl
   return turned;
 }
 
-/// The play between an encoder and its camera, so wide: the camera stands while the encoder crosses it, and is then
-/// pushed by its edge. Two plays in a row are one of both widths. Below zero: the encoder lags behind the camera.
+/// Backlash of `width` between encoder and camera: the camera stands while the encoder crosses it, then is pushed
+/// by its edge. Two in series act as one of the summed width. Negative: the encoder lags behind the camera.
 void undo_backlash(Rows rows, Eigen::Index axis, double width) {
   const double half = 0.5 * std::abs(width), sign = width < 0.0 ? -1.0 : 1.0;
-  constexpr double still_rad = 1e-6;  // encoders' last digit is no motion
+  constexpr double still_rad = 1e-6;  // a change of the encoder's last digit is not a motion
   double first = not_seen, way = 0.0;
   for (const RotationRow& row : rows) {
     const double angle = row.pan_tilt_roll_rad[axis];
@@ -54,7 +54,7 @@ void undo_backlash(Rows rows, Eigen::Index axis, double width) {
     way = angle > first ? 1.0 : -1.0;
     break;
   }
-  double camera = first - half * way;  // it had been rotating before the log began
+  double camera = first - half * way;  // as if it had been rotating in this direction before the log began
   for (RotationRow& row : rows) {
     double& angle = row.pan_tilt_roll_rad[axis];
     if (!std::isfinite(angle)) continue;
@@ -63,7 +63,7 @@ void undo_backlash(Rows rows, Eigen::Index axis, double width) {
   }
 }
 
-/// A value so much later than `now`, by the parabola through three rows.
+/// Value at `late_s` after `now`, by the parabola through three rows.
 Eigen::Vector3d later(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const Eigen::Vector3d& after,
                       double h0, double h, double late_s) {
   const Eigen::Vector3d slope0 = (now - before) / h0, slope = (after - now) / h;
@@ -71,9 +71,9 @@ Eigen::Vector3d later(const Eigen::Vector3d& before, const Eigen::Vector3d& now,
   return now + late_s * (rate + late_s * half_acceleration);
 }
 
-/// The clock that the rotation is read by goes at another rate than the images': of a row's rotation the one that was
-/// measured so much later for each second since the midpoint of the log, and of rates as much more: a turn is what its
-/// time makes of it. The first and the last row keep their time.
+/// The clock of the rotation runs at another rate than that of the images: each row gets the
+/// rotation that was measured `amount` later per second since the midpoint of the log, and rates
+/// are scaled likewise, as a rotation is rate × time. The first and the last row are not shifted.
 void undo_clock_rate(Rows rows, double amount) {
   for (RotationRow& row : rows) row.rate_rad_per_s *= 1.0 + amount;
   if (rows.size() < 3) return;
@@ -85,7 +85,7 @@ void undo_clock_rate(Rows rows, double amount) {
     if (!(h0 > 0.0) || !(h > 0.0)) continue;
     const auto shift = [&](Eigen::Vector3d RotationRow::*value) {
       const Eigen::Vector3d shifted = later(before.*value, now.*value, after.*value, h0, h, late_s);
-      if (shifted.allFinite()) rows[k].*value = shifted;  // a neighbour may not have been measured
+      if (shifted.allFinite()) rows[k].*value = shifted;  // a neighbouring row may lack a measurement
     };
     shift(&RotationRow::pan_tilt_roll_rad);
     shift(&RotationRow::rate_rad_per_s);
@@ -107,7 +107,7 @@ std::string with_axis(const char* name, const char* axis, const char* unit) {
   return std::string(name) + "_" + axis + (*unit == '\0' ? "" : "_") + unit;
 }
 
-/// Pan, tilt and roll of a head with perpendicular axes that looks the same way. See base_from_cam_rotation().
+/// Pan, tilt and roll of a head with perpendicular axes for the same orientation. See base_from_cam_rotation().
 Eigen::Vector3d pan_tilt_roll_of(const Eigen::Matrix3d& base_from_cam) {
   const Eigen::Vector3d view = base_from_cam.col(2);
   const double pan = std::atan2(-view.x(), view.z()), tilt = std::asin(std::clamp(-view.y(), -1.0, 1.0));
@@ -116,7 +116,7 @@ Eigen::Vector3d pan_tilt_roll_of(const Eigen::Matrix3d& base_from_cam) {
   return {pan, tilt, std::atan2(rolled(1, 0), rolled(0, 0))};
 }
 
-/// The tilt axis is rotated by so much about the view, from where it would be perpendicular to the pan axis.
+/// The tilt axis is rotated by `amount` about the view, away from perpendicular to the pan axis.
 void undo_skew(Rows rows, double amount) {
   for (RotationRow& row : rows) {
     Eigen::Vector3d& angles = row.pan_tilt_roll_rad;
@@ -141,7 +141,7 @@ void add_head_errors(std::vector<RotationError>& errors) {
                           row.pan_tilt_roll_rad[axis] += amount * (row.t_s - rows.front().t_s);
                         }
                       }});
-    // A step wider than encoders' noise: its flicker at a turning point is no turning.
+    // A step wider than the noise of encoders: their flicker at a turning point is not a reversal.
     errors.push_back({"backlash", member, "rad", with_axis("backlash", name, "rad"), instrument_backlash_rad, 2e-4,
                       [axis](Rows rows, double amount) { undo_backlash(rows, axis, amount); }});
     const auto add_curve = [&](const char* word, const char* short_word, double (*of)(double), double times) {
@@ -204,7 +204,7 @@ std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_
   return errors;
 }
 
-/// By differences: rotations are smooth in what is measured.
+/// By differences: the rotations are smooth functions of the measured values.
 std::vector<TurnPattern> turn_patterns(const RotationLog& log, const std::vector<RotationError>& errors,
                                        double max_gap_s) {
   if (log.rows.empty() || errors.empty()) return {};

@@ -10,10 +10,10 @@
 namespace alidade {
 namespace {
 
-constexpr double min_sigma = 4.0;  // grey values of a thumbnail: less shows nothing
+constexpr double min_sigma = 4.0;  // grey values of a thumbnail: less is no texture
 constexpr std::size_t max_keyframes = 200;
 
-/// Correlation of what both show at a shift; of the overlap alone.
+/// Normalised correlation of two thumbnails at a shift, over their overlap.
 double correlation_at(const Thumbnail& first, const Thumbnail& second, int du, int dv) {
   double product = 0.0, squares_a = 0.0, squares_b = 0.0, sum_a = 0.0, sum_b = 0.0;
   int num = 0;
@@ -42,7 +42,7 @@ double correlation_at(const Thumbnail& first, const Thumbnail& second, int du, i
 
 double distance_rad(const Rigid3& a, const Rigid3& b) { return a.rotation.angularDistance(b.rotation); }
 
-/// The pose rotated so that the image centre looks where `shift_px` less looked before.
+/// Rotates the pose such that the image centre looks where the pixel `centre − shift_px` looked before.
 Rigid3 turned(const Camera& camera, const Rigid3& world_from_cam, const Eigen::Vector2d& shift_px) {
   const Eigen::Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
   const auto from = unproject(camera, centre), to = unproject(camera, centre - shift_px);
@@ -107,7 +107,7 @@ std::vector<SavedKeyframe> KeyframeStore::saved(std::span<const PathStep> path) 
   for (const Keyframe& keyframe : keyframes_) {
     SavedKeyframe saved{keyframe.world_from_cam, {Thumbnail::width, Thumbnail::height, {}}};
     if (keyframe.step) saved.world_from_cam = path[*keyframe.step].world_from_cam;
-    constexpr double grey = 128.0;  // half of what a byte holds; the mean does not count
+    constexpr double grey = 128.0;  // mid-grey, half of the range of a byte; the mean is irrelevant
     for (const float value : keyframe.thumbnail.grey)
       saved.thumbnail.grey.push_back(static_cast<std::uint8_t>(std::clamp(std::lround(value + grey), 0L, 255L)));
     all.push_back(std::move(saved));

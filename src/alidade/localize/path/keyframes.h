@@ -14,34 +14,34 @@ class Mat;
 
 namespace alidade {
 
-/// An image made very small: what is remembered of a place.
+/// A heavily downsampled image: the description of a place.
 struct Thumbnail {
   static constexpr int width = 40, height = 30;
-  std::array<float, static_cast<std::size_t>(width) * height> grey{};  ///< Without mean.
-  double energy = 0.0;                                                 ///< Σ grey²; 0: nothing to be seen.
+  std::array<float, static_cast<std::size_t>(width) * height> grey{};  ///< Mean removed.
+  double energy = 0.0;                                                 ///< Σ grey²; 0: no texture.
 };
 [[nodiscard]] Thumbnail thumbnail_of(const cv::Mat& grey);
 
-/// How alike two of them are, and how far apart: what is at p in `first` is at p + shift in `second`, in their pixels.
+/// Similarity of two thumbnails and their offset: content at p in `first` is at p + shift in `second` [their px].
 struct ThumbnailMatch {
   double correlation = -1.0;
   Eigen::Vector2i shift = Eigen::Vector2i::Zero();
 };
 [[nodiscard]] ThumbnailMatch match_thumbnails(const Thumbnail& first, const Thumbnail& second);
 
-/// Images whose pose was known, far enough from each other. B. Williams, G. Klein & I. Reid, "Automatic
+/// Images with known poses, sufficiently far apart from each other. B. Williams, G. Klein & I. Reid, "Automatic
 /// Relocalization and Loop Closing for Real-Time Monocular SLAM", PAMI 33(9), 2011; thumbnails: G. Klein & D. Murray,
 /// "Improving the Agility of Keyframe-Based SLAM", ECCV 2008.
 class KeyframeStore {
  public:
-  /// Keeps it if none is near: `near_m` and `near_rad` away. `step`: of the path.
+  /// Adds a keyframe, unless one is within `near_m` and `near_rad`. `step`: index in the path.
   void offer(const cv::Mat& grey, const Rigid3& world_from_cam, double near_m, double near_rad, std::size_t step = 0);
-  /// Those of a map that was saved.
+  /// Adds a keyframe of a saved map.
   void add(const SavedKeyframe& saved);
-  /// All, where the path now says that they were taken.
+  /// All keyframes, with their poses from the current path.
   [[nodiscard]] std::vector<SavedKeyframe> saved(std::span<const PathStep> path) const;
-  /// Poses from which an image may have been taken, the likeliest first: those of the keyframes most like it, rotated
-  /// by the shift of the image.
+  /// Candidate poses for an image, most likely first: those of the most similar keyframes, rotated by the shift between
+  /// the images.
   [[nodiscard]] std::vector<Rigid3> candidates(const cv::Mat& grey, const Camera& camera, std::size_t most) const;
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }
 
@@ -49,7 +49,7 @@ class KeyframeStore {
   struct Keyframe {
     Rigid3 world_from_cam;
     Thumbnail thumbnail;
-    std::optional<std::size_t> step = {};  ///< None: of an earlier run.
+    std::optional<std::size_t> step = {};  ///< Empty: from an earlier run.
   };
   std::vector<Keyframe> keyframes_;
 };

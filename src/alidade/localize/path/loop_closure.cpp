@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// When a point is seen.
+/// The frames in which a point is seen.
 struct PointTimes {
   std::size_t index = 0, first = 0, last = 0, num = 0;
 
@@ -22,10 +22,10 @@ struct PointTimes {
 struct LoopKeyframe {
   std::size_t frame = 0;
   std::vector<long> ids;
-  double depth_m = 1.0;  ///< Distance of its points, their median.
+  double depth_m = 1.0;  ///< Median distance of its points.
 };
 
-/// The same point as two keyframes have it, each in its own frame.
+/// The same point in the frames of two keyframes.
 struct PairedPoint {
   Eigen::Vector3d first, second;
 };
@@ -77,7 +77,7 @@ class LoopCloser {
     return problem_.points[times_.at(id).index].point_in_world;
   }
 
-  /// A new one where less than six tenths of the last one's points are seen.
+  /// Starts a new keyframe when less than 60 % of the last one's points are seen.
   void choose_keyframes() {
     constexpr double shared = 0.6;
     std::set<long> last;
@@ -108,11 +108,11 @@ class LoopCloser {
     return edges;
   }
 
-  /// To each keyframe the earlier ones that saw most of its points when these had other numbers.
+  /// Adds loop edges from each keyframe to the earlier ones with which it shares most points under other ids.
   void add_loops(std::vector<SimilarityEdge>& edges) const {
     constexpr std::size_t max_loops = 2;
     constexpr double share = 0.02, sigma_rad = 0.01;
-    std::map<long, std::vector<std::pair<std::size_t, long>>> before;  // by number: keyframe, id
+    std::map<long, std::vector<std::pair<std::size_t, long>>> before;  // number → (keyframe, id)
     for (std::size_t j = 0; j < keyframes_.size(); ++j) {
       std::map<std::size_t, std::vector<PairedPoint>> paired;
       const Rigid3 here = problem_.world_from_cam[keyframes_[j].frame].inverse();
@@ -136,10 +136,10 @@ class LoopCloser {
     }
   }
 
-  /// The similarity that most agree on (M. A. Fischler & R. C. Bolles 1981). None: fewer than half.
+  /// RANSAC for the similarity with most inliers (M. A. Fischler & R. C. Bolles 1981). Empty if fewer than half agree.
   [[nodiscard]] static std::optional<Similarity> agreed(std::span<const PairedPoint> points) {
     constexpr int num_draws = 60, num_refined = 2;
-    constexpr double near_share = 0.06;  // of the distance: what a depth by a camera that moves aside is off by
+    constexpr double near_share = 0.06;  // of the distance: the depth error of a camera that moves sideways
     std::mt19937_64 bits(1);
     std::vector<std::size_t> best;
     const auto fitted = [&](std::span<const std::size_t> chosen) {
@@ -175,7 +175,7 @@ class LoopCloser {
     return similarity;
   }
 
-  /// Where something is taken at a frame, between those of the keyframes around it.
+  /// Corrects a pose of a frame by interpolating the corrections of the keyframes around it.
   [[nodiscard]] Rigid3 corrected(std::size_t frame, const Rigid3& world_from_cam) const {
     const auto after = std::ranges::lower_bound(keyframes_, frame, {}, &LoopKeyframe::frame);
     const auto j = static_cast<std::size_t>(after - keyframes_.begin()), i = after->frame == frame ? j : j - 1;
@@ -197,7 +197,7 @@ class LoopCloser {
       problem_.world_from_cam[k] = corrected(k, problem_.world_from_cam[k]);
   }
 
-  /// Of one number, those that are at one position now.
+  /// Points with the same number whose positions now agree.
   struct Candidate {
     std::vector<long> ids;  ///< In order of time.
     std::size_t num = 0;
@@ -225,7 +225,7 @@ class LoopCloser {
     return by_keyframe;
   }
 
-  /// In turns, one of each keyframe's.
+  /// Merges candidates round-robin over the keyframes.
   void join(double max_at_once, LoopClosure& closure) {
     std::vector<int> num_at(problem_.world_from_cam.size(), 0);
     for (const auto& [id, times] : times_)
@@ -247,9 +247,9 @@ class LoopCloser {
     apply();
   }
 
-  /// Whether there is room for it in the time between.
+  /// Whether there is room for it in the frames between its observations; if so, reserves it.
   [[nodiscard]] bool fits(const Candidate& candidate, double max_at_once, std::vector<int>& num_at) const {
-    for (const int share : {0, 1}) {  // looked at, then taken
+    for (const int share : {0, 1}) {  // first pass: check; second pass: reserve
       for (std::size_t i = 0; i + 1 < candidate.ids.size(); ++i)
         for (std::size_t k = times_.at(candidate.ids[i]).last + 1; k < times_.at(candidate.ids[i + 1]).first; ++k) {
           num_at[k] += share;
@@ -280,7 +280,7 @@ class LoopCloser {
   std::map<long, PointTimes> times_;
   std::vector<std::vector<long>> seen_;
   std::vector<LoopKeyframe> keyframes_;
-  std::vector<Similarity> corrections_;  ///< Of each keyframe: where it is now from where it was.
+  std::vector<Similarity> corrections_;  ///< For each keyframe: new pose from old pose.
   std::map<long, long> joined_;
 };
 

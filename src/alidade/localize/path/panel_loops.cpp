@@ -7,7 +7,7 @@ namespace {
 
 using Four = double __attribute__((vector_size(32)));
 
-/// Four doubles where they stand, aligned as doubles are.
+/// Four doubles in memory with the alignment of a double.
 struct [[gnu::packed, gnu::aligned(8), gnu::may_alias]] InMemory {
   Four four;
 };
@@ -15,7 +15,7 @@ struct [[gnu::packed, gnu::aligned(8), gnu::may_alias]] InMemory {
 const InMemory& at(const double* from) { return *reinterpret_cast<const InMemory*>(from); }
 void store(const Four& four, double* to) { reinterpret_cast<InMemory*>(to)->four = four; }
 
-/// Of eight rows and four columns. Filled number by number: g++ 12 clears an array slowly, in memory.
+/// Eight rows and four columns. Filled entry by entry: g++ 12 clears an array slowly, in memory.
 struct Tile {
   Four low[4], high[4];
   Tile() {
@@ -23,7 +23,7 @@ struct Tile {
   }
 };
 
-/// Rows of a 4 × 4 block given by its columns.
+/// Transposes a 4 × 4 block given by its columns.
 void transpose(Four (&block)[4]) {
   const Four a = __builtin_shufflevector(block[0], block[1], 0, 4, 2, 6),
              b = __builtin_shufflevector(block[0], block[1], 1, 5, 3, 7),
@@ -60,7 +60,7 @@ ALIDADE_VECTOR_CLONES void loop_subtract_tile(const double* a, const double* b, 
   }
 }
 
-/// From a tile of a matrix of which so many rows and columns are left from there on.
+/// Subtracts from a tile of a matrix with that many rows and columns left from there on.
 void subtract(const Tile& tile, double* from, std::size_t stride, int rows_left, int columns_left) {
   for (int j = 0; j < std::min(4, columns_left); ++j, from += stride) {
     if (rows_left >= panel) {
@@ -195,7 +195,7 @@ void mirror_tile(const double* tile, double* mirror, std::size_t stride) {
   }
 }
 
-// What other files call (vector_clones.h says why).
+// The entry points for other files (for the reason see vector_clones.h).
 
 void subtract_tile(const double* a, const double* b, int num, double* P, double* mirror, std::size_t stride) {
   loop_subtract_tile(a, b, num, P, mirror, stride);

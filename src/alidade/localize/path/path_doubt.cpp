@@ -26,7 +26,7 @@ Doubt PathDoubt::after(const PathStep& step) {
   const std::size_t num = step.num_tracked + step.num_gated;
   if (num == 0) return Doubt::none;
   constexpr double max_nis = 2.0, max_gated = 0.6;
-  constexpr double max_known_gated = 0.85;  // four known points, two of them mismatched, are no proof
+  constexpr double max_known_gated = 0.85;  // with four known points, two mismatches prove nothing
   constexpr double many_known_gated = 0.3;
   push(recent_nis_, step.num_tracked > 0 ? step.nis_per_dof : max_nis);
   push(recent_gated_, share(step.num_gated, num));

@@ -9,18 +9,18 @@ namespace alidade {
 
 enum class Doubt {
   none,
-  some,    ///< More than three in ten of the target's observations are gated: the path may be wrong, or they.
+  some,    ///< More than three in ten of the target's observations are gated: the path may be wrong, or they are.
   many,    ///< Most observations, or nearly all of the target's, are gated.
-  strong,  ///< Those that fit contradict each other: the path is wrong.
+  strong,  ///< The observations that fit contradict each other: the path is wrong.
 };
 
-/// `part` of `of`, 0 where there is nothing.
+/// `part` / `of`; 0 if `of` is 0.
 [[nodiscard]] double share(std::size_t part, std::size_t of);
 
-/// Whether the last frames indicate that the path is wrong: it may fit its own map and still be wrong.
+/// Whether the last frames indicate that the path is wrong: it may be consistent with its own map and still be wrong.
 class PathDoubt {
  public:
-  /// Over five frames with observations. Strong: mean NIS above 2.
+  /// Updated with one step; over the last five frames with observations. Strong: mean NIS above 2.
   [[nodiscard]] Doubt after(const PathStep& step);
   void clear();
 

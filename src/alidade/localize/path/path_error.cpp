@@ -20,7 +20,7 @@ struct Pair {
   }
 };
 
-/// RPE: between neighbours, with the aligned scale.
+/// RPE: between neighbours, with the scale of the alignment.
 void add_steps(std::span<const Pair> pairs, PathError& error) {
   double steps2 = 0.0, turns2 = 0.0;
   for (std::size_t i = 1; i < pairs.size(); ++i) {
@@ -36,7 +36,7 @@ void add_steps(std::span<const Pair> pairs, PathError& error) {
   error.rpe_rad = std::sqrt(turns2 / num);
 }
 
-/// ATE, and what the covariances say of it.
+/// ATE, and its NEES by the covariances.
 void add_aligned(std::span<const Pair> pairs, const Similarity& fit, bool has_covs, PathError& error) {
   double sum2 = 0.0, variance_m2 = 0.0, nees = 0.0;
   for (const Pair& pair : pairs) {
@@ -56,7 +56,7 @@ void add_aligned(std::span<const Pair> pairs, const Similarity& fit, bool has_co
   error.nees_aligned_per_dof = nees / (3.0 * num);
 }
 
-/// Whether the truth is in the frame of the path: no farther from it than errors are.
+/// Whether the truth is in the frame of the path: no farther away than errors explain.
 bool is_in_one_frame(std::span<const Pair> pairs, const PathError& error) {
   constexpr double max_sigma = 10.0, max_of_size = 0.1, max_rotation_rad = 0.2;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();

@@ -5,8 +5,8 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/path_system.h"
 
-// What a path is solved from beside its observations (path_observations.cpp): known points, given distances, the
-// motion, the start.
+// Factors of the path's cost other than observations (path_observations.cpp): known points, distance priors, motion,
+// start.
 
 namespace alidade {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using WindowRows = PathSmoother::WindowRows;
 
-constexpr double hardly_given = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing determines must not stop all others
+constexpr double hardly_given = 1e-6;  // m⁻², rad⁻²: a single undetermined pose must not stop the solution
 
 void add_window(const WindowRows& J, const Eigen::Vector<double, 6>& error, const Eigen::Vector<double, 6>& variance,
                 SmootherSystem& system) {
@@ -26,13 +26,13 @@ void add_window(const WindowRows& J, const Eigen::Vector<double, 6>& error, cons
 
 Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& phi) { return right_jacobian(phi).inverse(); }
 
-/// Noise of the mean speed over `n` steps of a walk with unit steps, and what of it is left to the end.
+/// Variance of the mean velocity over `n` steps of a random walk with unit steps, and of its part left to the end.
 double walked_before(double n) { return (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n); }
 double walked_after(double n) { return (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n); }
 
 }  // namespace
 
-/// Of what was given of the estimated part of the lens: its covariance where the file has one, else the filter's σ.
+/// Prior information of the estimated part of the lens: from its covariance in the camera file, else the filter's σ.
 Eigen::MatrixXd PathSmoother::lens_information() const {
   Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num_estimated_, num_estimated_);
   const bool has_cov = problem_.camera.cov.size() > 0 && !is_lens_freed_;
@@ -46,7 +46,7 @@ Eigen::MatrixXd PathSmoother::lens_information() const {
   return inverse_symmetric(cov);
 }
 
-/// Of what is given and not estimated: the rest of the lens, the target's scale; the other causes are taken for absent.
+/// Covariance of the consider parameters: the rest of the lens, the target's scale; the other causes are assumed zero.
 Eigen::MatrixXd PathSmoother::considered_cov() const {
   const int num_rest = static_cast<int>(lens_order_.size()) - num_estimated_;
   Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num_rest + num_causes, num_rest + num_causes);
@@ -58,8 +58,8 @@ Eigen::MatrixXd PathSmoother::considered_cov() const {
   return cov;
 }
 
-/// Of a target that is longer along x than given and as much shorter along y, by a share: what a given position
-/// changes by.
+/// Derivative of a given position with respect to the shape of the target: relatively longer along x than given, and
+/// shorter along y by the same ratio.
 Eigen::Vector3d PathSmoother::shape_change(const Eigen::Vector3d& given_in_world) const {
   const Eigen::Vector3d out = given_in_world - target_centre_;
   return {0.5 * out.x(), -0.5 * out.y(), 0.0};
@@ -69,7 +69,7 @@ void PathSmoother::add_given_point(const SmootherState& state, std::size_t point
   const Eigen::Vector3d& given = *problem_.points[point].given_in_world;
   const double weight = std::pow(problem_.points[point].sigma_m, -2);
   const Eigen::Vector3d error = state.points[point] - given;
-  Eigen::Matrix<double, 3, 2> J;  // of where it is given: by scale, and by shape
+  Eigen::Matrix<double, 3, 2> J;  // derivative of the given position w.r.t. scale and shape
   J << given, shape_change(given);
   PoseChain& chain = system.chain;
   const int at = chain.place_of(point), by = causes_at_ + scale_cause;
@@ -82,7 +82,7 @@ void PathSmoother::add_given_point(const SmootherState& state, std::size_t point
   chain.b.segment<2>(by) += weight * J.transpose() * error;
 }
 
-/// What was given of the lens.
+/// Prior of the lens.
 void PathSmoother::add_given_lens(const SmootherState& state, SmootherSystem& system) const {
   PoseChain& chain = system.chain;
   if (num_estimated_ == 0) return;
@@ -108,14 +108,14 @@ PathSmoother::Twist PathSmoother::twist_at(const SmootherState& state, std::size
   return twist;
 }
 
-/// What was believed of a point's distance where it was first seen, as an inverse one.
+/// Prior of a point's distance from the camera that first observed it, in inverse distance.
 void PathSmoother::add_range(const SmootherState& state, std::size_t point, SmootherSystem& system) const {
   const SmootherPoint& given = problem_.points[point];
   const Eigen::Vector3d from_camera = state.points[point] - state.poses[given.first_frame].translation;
   const double distance_m = from_camera.norm(), weight = given.range->range_m / given.range->sigma_rel;
   const double error = weight * (1.0 / distance_m - 1.0 / given.range->range_m);
   const Eigen::Vector3d J =
-      -weight / std::pow(distance_m, 3) * from_camera;  // by the point; by the position, minus that
+      -weight / std::pow(distance_m, 3) * from_camera;  // w.r.t. the point; w.r.t. the position, minus that
   PoseChain& chain = system.chain;
   const int at = chain.place_of(point);
   chain.A.topLeftCorner<3, 3>() += J * J.transpose();
@@ -126,7 +126,7 @@ void PathSmoother::add_range(const SmootherState& state, std::size_t point, Smoo
   system.cost += error * error;
 }
 
-/// Speed and rate between frame i and the next.
+/// Velocity and angular rate between frame i and the next.
 PathSmoother::Speeds PathSmoother::speeds(const SmootherState& state, std::size_t i) const {
   const double dt_s = problem_.t_s[i + 1] - problem_.t_s[i];
   const Eigen::Vector3d phi = log_so3(state.poses[i].rotation.conjugate() * state.poses[i + 1].rotation);
@@ -139,9 +139,9 @@ PathSmoother::Speeds PathSmoother::speeds(const SmootherState& state, std::size_
   return out;
 }
 
-/// The size of what is around frame k, over what it is where the problem begins, with its derivative by the position
-/// and by each point that is there. Points count by 1/d², as their parallax does: one whose distance hardly anything
-/// tells is not moved.
+/// Size of the surroundings of frame k relative to the initial guess, with its derivatives with respect to the position
+/// and each point there. Points are weighted by 1/d², as their parallax is: one with an uncertain distance is not
+/// affected.
 PathSmoother::Surroundings PathSmoother::surroundings(const SmootherState& state, std::size_t k,
                                                       const PoseChain& chain) const {
   constexpr double nearest = 1e-6;
@@ -164,8 +164,8 @@ PathSmoother::Surroundings PathSmoother::surroundings(const SmootherState& state
   return out;
 }
 
-/// Of speeds that differ, in the camera's frame and in the unit that the surroundings give: a world that is rotated,
-/// moved or larger leaves it as it is, and its derivatives say so. J: of the difference itself, in the world's.
+/// Factor for a change of velocity, in the camera's frame and in the unit given by the surroundings: invariant to a
+/// rotation, translation or scaling of the world, as are its derivatives. J: of the change itself, in the world frame.
 void PathSmoother::add_acceleration(const Surroundings& around, const WindowRows& J, Eigen::Vector<double, 6> error,
                                     const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const {
   WindowRows scaled = J;
@@ -187,12 +187,12 @@ void PathSmoother::add_acceleration(const Surroundings& around, const WindowRows
   chain.b += squares * around.by_border;
 }
 
-/// Of how many times its accelerations are drawn from a frame to the next.
+/// Number of changes of the random acceleration between frame k and the next.
 double PathSmoother::num_steps(std::size_t k) const {
   return std::max(1.0, std::round((problem_.t_s[k + 1] - problem_.t_s[k]) / problem_.period_s));
 }
 
-/// Of a change of speed and rate by one draw.
+/// Variance of the change of velocity and rate by one of these.
 Eigen::Vector<double, 6> PathSmoother::step_variance() const {
   Eigen::Vector<double, 6> variance;
   variance << Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_a_m_s2 * problem_.period_s, 2)),
@@ -200,7 +200,7 @@ Eigen::Vector<double, 6> PathSmoother::step_variance() const {
   return variance;
 }
 
-/// The first speeds differ from what was given.
+/// Prior of the first velocities.
 void PathSmoother::add_first_speeds(const Speeds& first, std::size_t k, SmootherSystem& system) const {
   Eigen::Vector<double, 6> given = Eigen::Vector<double, 6>::Zero(), variance;
   variance << Eigen::Vector3d::Constant(std::pow(problem_.sigma_speed_m_s, 2)),
@@ -209,7 +209,7 @@ void PathSmoother::add_first_speeds(const Speeds& first, std::size_t k, Smoother
     given << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
     variance = problem_.start->cov.diagonal().tail<6>();
   }
-  constexpr double any_m_s = 5.0;  // an IMU's path is in metres; what was supposed of its speed is not
+  constexpr double any_m_s = 5.0;  // an IMU's path is in metres, but the velocity prior is not
   if (problem_.imu) variance.head<3>().array() += any_m_s * any_m_s;
   WindowRows J = WindowRows::Zero();
   J.leftCols<6>() = first.J_from;
@@ -217,8 +217,8 @@ void PathSmoother::add_first_speeds(const Speeds& first, std::size_t k, Smoother
   add_window(J, first.values - given, variance + walked_before(num_steps(k)) * step_variance(), system);
 }
 
-/// Speed and rate from frame k to the next, and from there to the one after it, differ by drawn accelerations. A jump
-/// determines nothing, and behind it they begin again.
+/// White-acceleration model: velocity and rate from frame k to the next, and from there to the one after it, differ by
+/// random accelerations. Across a jump there is no factor, and velocities start again after it.
 void PathSmoother::add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
   const auto is_jump = [&](std::size_t i) { return i < problem_.is_jump.size() && problem_.is_jump[i]; };
   if (is_jump(k) || is_jump(k + 1)) system.chain.A.diagonal().head<6>().array() += hardly_given;
@@ -242,7 +242,7 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
   add_acceleration(surroundings(state, k, system.chain), J, change, num_drawn * step_variance(), system);
 }
 
-/// Where what is given is tested, with what the motion asks of each pose and point.
+/// Adds the motion; if given numbers are to be tested, records its gradient by pose and point.
 void PathSmoother::add_motion_and_pull(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
   const PoseChain& chain = system.chain;
   if (!system.has_given) return add_motion(state, k, system);
@@ -269,8 +269,8 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
   system.cost += error.dot(information * error);
 }
 
-/// Where steps are kept short: those of a frame's pose, and of the points that enter with it, are zero give or take a
-/// share of the distances there, as measured: K. Levenberg 1944, and D. W. Marquardt 1963, in units of the scene.
+/// Damping: the steps of a frame's pose, and of the points that enter with it, are zero with σ a share of the distances
+/// there (K. Levenberg 1944, D. W. Marquardt 1963, in units of the scene).
 void PathSmoother::keep_steps_short(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
   if (!(step_share_ > 0.0) || there_[k].empty()) return;
   double sum = 0.0;
@@ -287,8 +287,8 @@ void PathSmoother::keep_steps_short(const SmootherState& state, std::size_t k, S
         std::pow(step_share_ * distance_to(point), -2);
 }
 
-/// None also where it costs more than `most`: then the rest of it is not needed; and where a point is not determined,
-/// which `vague` is told.
+/// Empty also if the cost exceeds `most`, where the rest is not needed, and if a point is not determined; then `vague`
+/// is its index.
 std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared, double most,
                                                   std::optional<std::size_t>* vague) const {
   SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_solved(), max_at_once_)};

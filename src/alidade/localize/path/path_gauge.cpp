@@ -3,19 +3,19 @@
 #include "alidade/localize/map/map_frame.h"
 #include "alidade/localize/path/path_system.h"
 
-// What of a path's covariance is its shape's, where no measurement says where and how large the world is.
+// Covariance of a path's shape, where no measurement determines position, rotation and scale of the world.
 
 namespace alidade {
 namespace {
 
 using GaugeMatrix = Eigen::Matrix<double, 6, 7>;
 
-/// How the poses of a path move with a motion of the world and its size, and what of their errors counts in the best
+/// Derivatives of a path's poses with respect to a similarity of the world, and the weights of their errors in the best
 /// alignment.
 struct Gauge {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   int num_free = 7;
-  std::vector<Eigen::MatrixXd> G, W;  ///< By pose: its moves, and the same by how much it counts.
+  std::vector<Eigen::MatrixXd> G, W;  ///< By pose: derivatives, and weighted ones.
   Ldlt normal;
 
   [[nodiscard]] bool is_determined() const { return normal.min_pivot() > 0.0; }
@@ -24,8 +24,8 @@ struct Gauge {
   }
 };
 
-/// Rotations count as much as positions a hundredth of the path apart: of a path on a line they alone determine how it
-/// is rolled about it.
+/// Rotations are weighted like positions 1 % of the path's extent apart: for a path along a line only they determine
+/// the roll about it.
 Gauge gauge_of(std::span<const Rigid3> poses, int num_free) {
   const auto num = static_cast<double>(poses.size());
   Gauge gauge{.num_free = num_free};
@@ -47,8 +47,8 @@ Gauge gauge_of(std::span<const Rigid3> poses, int num_free) {
   return gauge;
 }
 
-/// What is left of a covariance P where the sums that align have the covariance `of_sums`, z with what it is of, and
-/// that moves by g with them.
+/// Covariance after alignment of an error with covariance P, where the alignment's sums have covariance `of_sums`, z is
+/// their cross-covariance with it, and g its derivative with respect to them.
 Eigen::MatrixXd aligned_cov(const Gauge& gauge, const Eigen::MatrixXd& of_sums, const Eigen::MatrixXd& P,
                             const Eigen::MatrixXd& z, const Eigen::MatrixXd& g) {
   const Eigen::MatrixXd across = g * gauge.normal.solve_each(z.transpose());
@@ -58,15 +58,15 @@ Eigen::MatrixXd aligned_cov(const Gauge& gauge, const Eigen::MatrixXd& of_sums, 
 
 }  // namespace
 
-/// Errors are what is left after the best alignment (W. Baarda, "S-Transformations and Criterion Matrices", 1973): of
-/// positions, by a motion of the world and, where its unit is a supposed one, by its size.
+/// Errors are those after the best alignment (W. Baarda, "S-Transformations and Criterion Matrices", 1973): by a rigid
+/// motion of the world and, if its unit of length is assumed, by its scale.
 void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& considered,
                          PoseChain::Spread& spread) const {
   if (problem_.gauge == PathGauge::fixed) return;
   const Gauge gauge = gauge_of(state_.poses, problem_.gauge == PathGauge::similarity ? 7 : 6);
   if (!gauge.is_determined()) return;
   const std::size_t num = state_.poses.size();
-  PoseChain::Columns Z = system.chain.solve({gauge.W, {}}, num_solved());  // covariance with the sums that align
+  PoseChain::Columns Z = system.chain.solve({gauge.W, {}}, num_solved());  // cross-covariance with the sums
   Eigen::MatrixXd given = Eigen::MatrixXd::Zero(spread.J.front().cols(), gauge.num_free);
   for (std::size_t k = 0; k < num; ++k) given += spread.J[k].transpose() * gauge.W[k];
   const Eigen::MatrixXd moved_by_given = gauge.normal.solve_each(given.transpose());
@@ -91,7 +91,7 @@ void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& co
 
 namespace {
 
-/// How the points of a map move with its frame, and by how much each says where that is.
+/// Derivatives of a map's points with respect to its frame, and the weight of each in determining it.
 struct MapGauge {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   std::vector<Eigen::MatrixXd> G, W;  ///< By point of the map.
@@ -116,8 +116,8 @@ struct MapGauge {
 
 }  // namespace
 
-/// Of points whose frame is given: what their errors have in common is that frame's, and what is left is beside it, at
-/// least a tenth of σ. Where the path's frame is its own only the unit is given, and without a unit nothing.
+/// For points in a given frame: splits their covariance into the error of the frame and that within it, at least a
+/// tenth of σ. If the path defines its own frame, only the unit is given; without a unit nothing.
 void PathSmoother::fill_frame(const SmootherSystem& system, const Eigen::MatrixXd& considered,
                               const PoseChain::Spread& spread, SmoothedPath& path) const {
   path.covs_in_map = path.point_covs;
@@ -143,7 +143,7 @@ void PathSmoother::fill_frame(const SmootherSystem& system, const Eigen::MatrixX
   path.frame.cov(6, 6) = of_sums(6, 6);
   if (problem_.gauge != PathGauge::fixed) return;
   path.frame.cov = 0.5 * (of_sums + of_sums.transpose());
-  constexpr double least = 0.01;  // of a variance
+  constexpr double least = 0.01;  // of the variance
   for (std::size_t i = 0; i < path.ids.size(); ++i) {
     const Eigen::MatrixXd& z = Z.points[index_of_.at(path.ids[i])];
     const Eigen::MatrixXd across = gauge.G[i] * gauge.normal.solve_each(z.transpose());
@@ -153,7 +153,7 @@ void PathSmoother::fill_frame(const SmootherSystem& system, const Eigen::MatrixX
   }
 }
 
-/// The same where a map moves along a direction farther than its covariance has it: its frame does.
+/// The same for a move of the map along a direction with more variance than its covariance has: the frame takes it.
 void PathSmoother::widen_frame(std::span<const Eigen::Vector3d> moves, double more, SmoothedPath& path) const {
   if (path.points.size() < 4) return;
   const MapGauge gauge(path.points, path.covs_in_map);

@@ -9,18 +9,18 @@
 #include "alidade/localize/imu/imu_alignment.h"
 #include "alidade/localize/path/path_system.h"
 
-// What a path is solved from where there is an IMU: its rates between two frames, its forces between three, in place
-// of drawn accelerations; and what is known of its own numbers, which stand first of all that is shared.
+// Factors of an IMU: angular rates between two frames and specific forces between three, in place of random
+// accelerations; and the priors of its own parameters, which come first of all shared ones.
 
 namespace alidade {
 namespace {
 
-constexpr double middle_of_three = 2.366;  // of χ² of three components, the median
+constexpr double middle_of_three = 2.366;  // median of χ² with three degrees of freedom
 
 double square_of(double value) { return value * value; }
 
-/// σ of the readings' white noise over the one given, at least 1, by their second differences: a path of few frames
-/// bends to noise and shows little of it. Where those are not as white noise's, as of vibration or a filter, 1.
+/// σ of the readings' white noise over the given one, at least 1, from second differences: a path of few frames absorbs
+/// noise and shows little of it. 1 if the differences do not look white, as with vibration or a filter.
 double noise_factor(std::span<const ImuReading> readings, Eigen::Vector3d ImuReading::*of, double density) {
   constexpr std::size_t min_readings = 100;
   if (readings.size() < min_readings) return 1.0;
@@ -37,7 +37,7 @@ double noise_factor(std::span<const ImuReading> readings, Eigen::Vector3d ImuRea
     before_that = before;
     before = second;
   }
-  // Of white noise: −4 and 1 of 6.
+  // autocorrelation of white noise after second differences: −4/6 and 1/6
   const bool is_white = std::abs(next / square + 4.0 / 6.0) < 0.06 && std::abs(after / square - 1.0 / 6.0) < 0.08;
   if (!is_white) return 1.0;
   constexpr double median_of_normal = 0.6745, of_second_difference = 6.0;
@@ -47,15 +47,15 @@ double noise_factor(std::span<const ImuReading> readings, Eigen::Vector3d ImuRea
   return std::isfinite(ratio) && ratio > same ? ratio : 1.0;
 }
 
-/// How the biases of one sensor change from node to node, by what is known of their walk and the readings.
+/// Changes of one sensor's biases from node to node, from the prior of their random walk and the readings.
 struct Walked {
   Eigen::VectorXd by;   ///< Over σ of the walk,
-  Eigen::MatrixXd cov;  ///< and its covariance by both, in the same.
+  Eigen::MatrixXd cov;  ///< and its posterior covariance, in the same unit.
 };
 
-/// By how much the walk's variance is larger, at its maximum likelihood, and what that gains of −2 ln likelihood:
-/// along each eigenvector of the covariance K, what the readings alone say of it is y = u/(1 − k) with variance
-/// k/(1 − k).
+/// Maximum likelihood factor on the variance of the walk, and the decrease of −2 ln likelihood by it:
+/// along each eigenvector of the covariance K, the readings alone give y = u/(1 − k) with variance k/(1 −
+/// k).
 struct LargerWalk {
   double factor = 1.0, gain = 0.0;
 };
@@ -82,7 +82,7 @@ LargerWalk larger_walk(const Walked& walked) {
 
 }  // namespace
 
-/// Steps between frames, as far as there are readings, by the biases to begin at.
+/// Preintegrates the steps between frames for which there are readings, at the initial biases.
 void PathSmoother::begin_imu() {
   if (!problem_.imu) return;
   const SmootherImu& imu = *problem_.imu;
@@ -106,8 +106,8 @@ void PathSmoother::begin_imu() {
   leave_out_blows();
 }
 
-/// Steps that are far from where the problem begins, by what the others are: an IMU is surer of a step than the
-/// observations of a frame are, and a blow would bend the path before it is known for one.
+/// Rejects steps that are far from the initial guess compared with the others: an IMU step is more certain than the
+/// observations of a frame, and a shock would bend the path before it is recognised.
 void PathSmoother::leave_out_blows() {
   constexpr double far = 6.0;
   const auto leave_out = [&](std::vector<bool>& used, const auto& error_of) {
@@ -155,8 +155,8 @@ void PathSmoother::add_imu(const SmootherState& state, std::size_t k, SmootherSy
   if (uses_forces(k)) add(forces_at(state, k), force_noise_ * forces_variance(k));
 }
 
-/// What is known of how an IMU's axes differ, which are alike in all directions: a symmetric part has √2 less off the
-/// diagonal. The trace of the forces' is their scale, and is not estimated twice.
+/// Prior of the errors of the axes, isotropic: off the diagonal a symmetric part has σ smaller by √2. The trace of the
+/// force axes is the force scale, and is not estimated twice.
 void PathSmoother::add_given_axes(const ImuState& is, double sigma, PoseChain& chain, double& cost) {
   const auto add = [&](int at, double error, double weight) {
     chain.B(at, at) += weight;
@@ -174,7 +174,7 @@ void PathSmoother::add_given_axes(const ImuState& is, double sigma, PoseChain& c
   cost += no_trace * trace * trace;
 }
 
-/// What is known of an IMU before: sizes of its biases and of gravity, walks of the biases, mounting, clock.
+/// Priors of the IMU: magnitudes of its biases and of gravity, bias walks, mounting, clock.
 void PathSmoother::add_given_imu(const SmootherState& state, SmootherSystem& system) const {
   if (!problem_.imu) return;
   const SmootherImu& given = *problem_.imu;
@@ -219,11 +219,11 @@ void PathSmoother::add_given_imu(const SmootherState& state, SmootherSystem& sys
   system.cost += weight * error * error;
 }
 
-/// Where residuals are larger than the given noise, σ is enlarged, by their median; a step far beyond that, as of a
-/// blow, is rejected. Whether anything of that differs from before.
+/// Where residuals exceed the given noise, σ is enlarged by their median; a step far beyond that, such as a shock, is
+/// rejected. Returns whether any of this changed.
 bool PathSmoother::choose_steps() {
   if (!problem_.imu) return false;
-  constexpr double gate = 21.1;  // χ² of three components: 99.99 %
+  constexpr double gate = 21.1;  // χ² with three degrees of freedom: 99.99 %
   bool is_other = false;
   const auto choose = [&](std::size_t num, const auto& has, const auto& chi2_of, double& noise, double floor,
                           std::vector<bool>& used) {
@@ -254,8 +254,8 @@ bool PathSmoother::choose_steps() {
   return is_other;
 }
 
-/// Where the biases change by more than the walk that was given lets them, it is enlarged to what is most likely: a
-/// sensor that warms up would bend the path. So is what is believed of the clock's rate.
+/// Where the biases change by more than the given random walk allows, it is enlarged to its maximum likelihood: a
+/// sensor that warms up would bend the path. The prior σ of the clock's rate likewise.
 bool PathSmoother::choose_walks() {
   if (!problem_.imu) return false;
   const auto system = build(state_, Shared::solved);
@@ -294,7 +294,7 @@ bool PathSmoother::choose_walks() {
   return is_other;
 }
 
-/// σ of the logarithm of the path's extent: of its scale, as far as nothing else changes it.
+/// σ of the logarithm of the path's extent: that of its scale, if nothing else changes the extent.
 void PathSmoother::fill_imu(const SmootherSystem& system, const Eigen::MatrixXd& cov, const Asked& asked,
                             SmoothedPath& path) const {
   if (!problem_.imu) return;

@@ -4,17 +4,17 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/path_system.h"
 
-// What a path's observations say of the lens: where they contradict what was given, it is estimated with the path.
+// Test of the given lens by the observations of a path: if they contradict it, it is estimated with the path.
 
 namespace alidade {
 namespace {
 
-/// Those of a lens's parameters that are off where a camera file is of another lens, another setting, or another
-/// medium, and how far they may be.
+/// Lens parameters that are wrong if a camera file belongs to another lens, another setting or another medium, and the
+/// σ of their errors.
 struct OpenParam {
   const char* name;
   double sigma;
-  bool is_relative;  ///< Centre: to the image's width; focal length: to itself.
+  bool is_relative;  ///< Centre: to the image width; focal length: to itself.
 };
 constexpr std::array<OpenParam, 6> open_params{{{"fx", 0.2, true},
                                                 {"fy", 0.2, true},
@@ -25,7 +25,7 @@ constexpr std::array<OpenParam, 6> open_params{{{"fx", 0.2, true},
 
 }  // namespace
 
-/// They stand first of all that is shared.
+/// The estimated parameters come first in lens_order_.
 void PathSmoother::estimate_lens(std::vector<int> estimated) {
   lens_order_ = std::move(estimated);
   num_estimated_ = static_cast<int>(lens_order_.size());
@@ -53,7 +53,7 @@ void PathSmoother::free_lens() {
   links_.clear();
 }
 
-/// What the best of the causes that are tested beside the lens explains of what is left over.
+/// Largest decrease of the cost by one of the causes that are tested beside the lens.
 double PathSmoother::best_cause(const Asked& all) const {
   const Eigen::Index causes = causes_at_ - lens_at_;
   double best = 0.0;
@@ -66,7 +66,7 @@ double PathSmoother::best_cause(const Asked& all) const {
   return best;
 }
 
-/// Whether the lens's parameters together explain of what is left over far more than chance and their covariance would.
+/// Whether the lens parameters together explain far more of the residuals than chance and their given covariance.
 bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   if (num_estimated_ > 0) return false;
   const std::vector<std::string> names = param_names(problem_.camera.lens);
@@ -78,8 +78,8 @@ bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   const Eigen::VectorXd score = all.score(open);
   const double num_left =
       2.0 * static_cast<double>(observations_.size()) - 6.0 * static_cast<double>(state_.poses.size());
-  // Matches of images may be far better than the σ that is the least of any: what is left over says by how much, up to
-  // a half.
+  // Matches of images may be far better than the σ floor: the residuals tell by how much, down to half of
+  // it.
   const double least_noise = problem_.compares_causes ? 1.0 : 0.25;
   const double noise = std::max(least_noise, system.observed_cost / std::max(num_left, 1.0));
   constexpr double far_more = 60.0;
@@ -87,7 +87,7 @@ bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   return squared_mahalanobis(score, information) > best_cause(all);
 }
 
-/// Of what of a lens is given with a covariance. `spread`: while its poses' rows are those of the equations.
+/// Changes of residuals by the given covariance of the lens. `spread`: before its rows are rotated to the camera.
 ResidualMoves PathSmoother::moves_by_lens(const Eigen::MatrixXd& considered, const Asked& asked,
                                           const PoseChain::Spread& spread) const {
   const Eigen::Index num = considered.rows() - num_causes;
@@ -108,20 +108,20 @@ ResidualMoves PathSmoother::moves_by_lens(const Eigen::MatrixXd& considered, con
 
 namespace {
 
-/// What of a lens is not of it as it was used (another focus or zoom, a stabiliser), and how far any may be off.
+/// Lens parameters that may differ from the calibration (focus or zoom, a stabiliser), and their largest error.
 struct HiddenParam {
   std::string_view given;
-  std::array<std::string_view, 2> names;  ///< Of its parameters.
-  double most;                            ///< Of a focal length over it, of a centre over the image's width.
+  std::array<std::string_view, 2> names;  ///< Names in the lens model.
+  double most;                            ///< Relative for a focal length; over the image width for a centre.
 };
 constexpr std::array<HiddenParam, 3> hidden_params{
     {{"focal length", {"fx", "fy"}, 0.04}, {"centre u", {"cx", ""}, 0.02}, {"centre v", {"cy", ""}, 0.02}}};
 
-constexpr double most_hidden_sigmas = 4.0;  ///< That what no score shows may move a pose by.
+constexpr double most_hidden_sigmas = 4.0;  ///< Limit for the move of a pose by an undetected error.
 
-/// The largest error, up to any of a lens, that its score would not show, and the σ by which that moves no pose by more
-/// than 4σ. Few points before a target hardly tell a longer lens from a larger distance, or another centre from a
-/// camera that is rotated, while the camera file's σ is that of another day.
+/// The largest error, at most `any`, that the score test would not detect, and the σ such that it moves no pose by more
+/// than 4σ. A few points on a target hardly distinguish a longer focal length from a larger distance, or another centre
+/// from a rotated camera, and the σ of the camera file may no longer apply.
 void hide(double any, GivenNumber& given) {
   constexpr double named_z = 3.5, unseen_z = 2.4;
   const double z = std::min(std::abs(given.z), named_z);
@@ -131,7 +131,7 @@ void hide(double any, GivenNumber& given) {
   given.sigma_hidden = std::sqrt(std::max(counted * counted - by_path * by_path, 0.0));
 }
 
-/// How far any pose moves with what is given, by its covariance.
+/// Largest Mahalanobis distance by which a change along `direction` moves a pose.
 double moves_together(const PoseChain::Spread& spread, const Eigen::VectorXd& direction,
                       std::span<const Eigen::Matrix<double, 6, 6>> covs) {
   double most = 0.0;
@@ -140,9 +140,9 @@ double moves_together(const PoseChain::Spread& spread, const Eigen::VectorXd& di
   return std::sqrt(most);
 }
 
-/// Another centre moves position and rotation together, and what these share is known far better than either: 4σ of
-/// each are many of that. Where an ordinary error would not show as 2σ of its score, so much counts that it moves no
-/// combination by more than 4σ; what a score beyond 2σ asks for counts as far as it is ordinary.
+/// Another centre moves position and rotation together, and combinations of these are far more certain than either: 4σ
+/// of each are many σ of a combination. If the score would not show an ordinary error as 2σ, σ is such that it moves no
+/// combination by more than 4σ; a change indicated by a score beyond 2σ is included as far as it is ordinary.
 void count_together(double any, double moves, GivenNumber& given) {
   constexpr double in_doubt_z = 2.0;
   const double ordinary = 0.5 * any, z = std::abs(given.z), sigma = z > 0.0 ? std::abs(given.asked) / z : any;
@@ -155,14 +155,14 @@ void count_together(double any, double moves, GivenNumber& given) {
 
 }  // namespace
 
-/// `path.given` and its ids are there.
+/// Requires `path.given` and the ids.
 void PathSmoother::fill_hidden(const PoseChain::Spread& spread, SmoothedPath& path) const {
   const std::vector<std::string> names = param_names(problem_.camera.lens);
   for (const HiddenParam& param : hidden_params) {
     const auto given = std::ranges::find(path.given, param.given, &GivenNumber::name);
     if (given == path.given.end()) continue;
     const bool is_focal = !param.names[1].empty();
-    if (!is_focal && problem_.gauge != PathGauge::fixed) continue;  // nothing says how such a world is rotated
+    if (!is_focal && problem_.gauge != PathGauge::fixed) continue;  // the rotation of such a world is undetermined
     hide(param.most * (is_focal ? 1.0 : problem_.camera.width_px), *given);
     Eigen::VectorXd direction = Eigen::VectorXd::Zero(spread.J.front().cols());
     for (int i = num_estimated_; i < static_cast<int>(lens_order_.size()); ++i) {

@@ -4,32 +4,32 @@
 #include "alidade/localize/checks/residual_structure.h"
 #include "alidade/localize/path/path_system.h"
 
-// What a path is solved from, most of it: its observations, and what the error of one shares with that of the same
-// point before.
+// Factors of the observations, the main part of a path's cost, and the correlation between errors of the same point in
+// successive frames.
 
 namespace alidade {
 
-/// How the expected pixel changes by what is shared: the lens, then the causes (scale and shape by known positions
-/// alone).
+/// Derivatives of the predicted pixel with respect to the shared parameters: the lens, then the causes (scale and shape
+/// only through the known positions).
 PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, std::size_t i, const Twist& twist) const {
   const UsedObservation& observation = observations_[i];
   const auto num_lens = view.J_px_lens.cols();
   GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
   for (Eigen::Index k = 0; k < num_lens; ++k) J.col(k) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(k)]);
   if (const auto& given = problem_.points[point_of_[i]].given_in_world) {
-    // A target that moves, or rotates about its centre: not where it is given to be, but further by so much.
+    // A target that moves, or rotates about its centre: displaced from its given position in proportion to time.
     const Eigen::Matrix<double, 2, 3> J_speed =
         (problem_.t_s[observation.frame] - mid_s_) * view.J_px_feature.leftCols<3>();
     J.middleCols<3>(num_lens + speed_cause) = J_speed;
     J.middleCols<3>(num_lens + turn_cause) = -J_speed * cross_matrix(*given - target_centre_);
   }
   const double rows =
-      observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its central row
+      observation.px.y() / problem_.camera.height_px - 0.5;  // the time of an image is that of its central row
   J.col(num_lens + readout_cause) = rows * view.J_px_pose * twist;
   return J;
 }
 
-/// None where the camera does not see it.
+/// Empty if the point is not visible.
 std::optional<PathSmoother::ObservationRows> PathSmoother::rows_of(const SmootherState& state, std::size_t i,
                                                                    const Twist& twist, bool has_given) const {
   const UsedObservation& observation = observations_[i];
@@ -48,7 +48,7 @@ std::optional<PathSmoother::ObservationRows> PathSmoother::rows_of(const Smoothe
   return rows;
 }
 
-/// The rows of all frames before `to` that are still looked at. False where an observation is not seen.
+/// Computes the rows of all frames before `to`. False if a point is not visible.
 bool PathSmoother::look_ahead(const SmootherState& state, std::size_t to, bool has_given, Lookahead& rows) const {
   for (; rows.next < to; ++rows.next) {
     auto& of_frame = rows.of_frame[rows.next % rows.of_frame.size()];
@@ -67,8 +67,8 @@ namespace {
 
 using Rows6 = Eigen::Matrix<double, 2, 6>;
 
-/// Terms of a pose of the window with itself, the point and what is shared. Products of two rows: Eigen's general ones
-/// cost more than they do.
+/// Blocks of a pose of the window with itself, the point and the shared parameters. Written as products of two rows:
+/// Eigen's general ones are slower here.
 template <typename Shared>
 void add_pose(int row, const Rows6& J, const Eigen::Matrix<double, 2, 3>& J_point, const Shared& J_shared,
               Eigen::Index shared_at, int at, const Eigen::Vector2d& error, PoseChain& chain) {
@@ -95,7 +95,7 @@ void add_point(const Eigen::Matrix<double, 2, 3>& J, const Shared& J_shared, Eig
 
 }  // namespace
 
-/// An observation of the window's pose at `row`, less a share of one of its first pose.
+/// Adds an observation of the window's pose at `row`, minus `share` times one of its first pose.
 void PathSmoother::add(const ObservationRows& rows, const ObservationRows* before, double share, int row, int at,
                        SmootherSystem& system) const {
   PoseChain& chain = system.chain;
@@ -114,7 +114,7 @@ void PathSmoother::add(const ObservationRows& rows, const ObservationRows* befor
   system.observed_cost += now.error.squaredNorm();
 }
 
-/// The observations of frame k, the first of the window; where errors last, those whose last one before was there.
+/// Adds the observations of frame k, the first of the window; with autocorrelation, those whose predecessor is in it.
 bool PathSmoother::add_observations(const SmootherState& state, std::size_t k, Lookahead& rows,
                                     SmootherSystem& system) const {
   const std::size_t end = std::min(links_.empty() ? k + 1 : k + 3, state.poses.size());
@@ -137,9 +137,9 @@ bool PathSmoother::add_observations(const SmootherState& state, std::size_t k, L
   return true;
 }
 
-/// Errors of a point that last from frame to frame as an autoregression of first order: what is new of each is as
-/// independent as it is small (D. Cochrane & G. Orcutt 1949). After a gap too long for the window an error begins
-/// again, with no more weight than it has as one of a row.
+/// Models the errors of a point as a first-order autoregression: the innovations are independent and have a smaller σ
+/// (D. Cochrane & G. Orcutt 1949). After a gap too long for the window an error starts again, with no more weight than
+/// as a member of a sequence.
 void PathSmoother::link_observations(double correlation) {
   std::map<long, std::size_t> last;
   link_correlation_ = correlation;
@@ -170,8 +170,8 @@ std::vector<PlacedResidual> PathSmoother::placed_residuals() const {
   return residuals;
 }
 
-/// Where some points' errors are larger than others', or errors last, the path is solved again with the former's own σ,
-/// and with what is new of each error. False where that cannot be.
+/// If errors of some points are larger than others', or errors are autocorrelated, solves again with σ per point, and
+/// with the innovations of the errors. False if that does not converge.
 bool PathSmoother::heed_colour() {
   constexpr double most = 0.98;
   constexpr double roughly = 0.3;

@@ -5,10 +5,10 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/localize/path/path_system.h"
 
-// A flat target seen from one side hardly determines its tilt, and does so differently as it is tilted more: the
-// posterior is a curved valley, of which the covariance at its lowest point knows one cut. So the least certain
-// combination of a pose's components is fixed three σ to each side, all else solved for again, and the cost compared
-// with the nine that it should have risen by (a profile likelihood: D. M. Bates & D. G. Watts, "Nonlinear Regression
+// A flat target seen from one side hardly determines its tilt, and does so the less linearly the larger σ is: the
+// posterior is a curved valley, and the covariance at its minimum describes one tangent only. So the least certain
+// combination of a pose's components is fixed at ±3σ, all else is estimated again, and the increase of the cost is
+// compared with the expected value of 9 (a profile likelihood: D. M. Bates & D. G. Watts, "Nonlinear Regression
 // Analysis", 1988, §6.1).
 
 namespace alidade {
@@ -36,10 +36,10 @@ void PathSmoother::add_fixed(const SmootherState& state, SmootherSystem& system)
   system.cost += error * error;
 }
 
-/// The pose whose position is least certain, and of its components (lengths over the distance) the least certain
-/// combination. False where the path is certain enough for its cut to be straight.
+/// Selects the pose with the least certain position and, of its components (lengths over the distance), the least
+/// certain combination. False if σ is small enough for the linear approximation.
 bool PathSmoother::fix_weakest(const SmoothedPath& path) {
-  constexpr double straight = 0.012;  // of the distance, and rad
+  constexpr double straight = 0.012;  // relative to the distance, and rad
   FixedCombination fixed;
   double max_m2 = 0.0;
   for (std::size_t k = 0; k < path.cov.size(); ++k) {
@@ -64,7 +64,7 @@ bool PathSmoother::fix_weakest(const SmoothedPath& path) {
 
 namespace {
 
-/// Whether the positions of a path differ by little of the distance, and by little more than they are uncertain.
+/// Whether the positions of a path vary little relative to the distance, and little more than their uncertainty.
 bool is_from_one_place(const SmoothedPath& path, const Eigen::Vector3d& target) {
   constexpr double apart = 12.0, parallax = 0.05;
   const double num = static_cast<double>(path.cov.size());

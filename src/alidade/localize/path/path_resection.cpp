@@ -14,7 +14,7 @@ namespace {
 struct PlacedView {
   Eigen::Vector2d residual_px;
   Eigen::Matrix<double, 2, 6> J;
-  double variance_px2 = 0.0;  ///< Of pixel and position, the mean of both coordinates.
+  double variance_px2 = 0.0;  ///< Of pixel and position together, mean of both coordinates.
 };
 
 std::optional<PlacedView> placed_view(const Camera& camera, const Rigid3& world_from_cam,
@@ -41,7 +41,7 @@ CameraResection judged(const Camera& camera, std::span<const PlacedObservation> 
   return resection;
 }
 
-/// One Gauss–Newton step with weights for residuals of `wide_px`. False where nothing determines it.
+/// One Gauss–Newton step with robust weights of width `wide_px`. False if the pose is not determined.
 bool stepped(const Camera& camera, std::span<const PlacedObservation> observations, double wide_px,
              Rigid3& world_from_cam) {
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
@@ -86,7 +86,7 @@ std::optional<CameraResection> resection(const Camera& camera, std::span<const P
 
 std::vector<Rigid3> poses_of_threes(const Camera& camera, std::span<const PlacedObservation> observations,
                                     int num_draws, std::size_t max_poses) {
-  constexpr double near_px2 = 8.0 * 8.0;  // three noisy rays locate the others so well
+  constexpr double near_px2 = 8.0 * 8.0;  // three noisy rays predict the others with about this accuracy
   std::vector<PlacedObservation> seen;
   std::vector<Eigen::Vector3d> rays_in_cam;
   for (const PlacedObservation& each : observations) {

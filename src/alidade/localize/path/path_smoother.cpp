@@ -34,7 +34,7 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
   begin_imu();
 }
 
-/// A point is there from its first observation, or where its distance was believed, to its last.
+/// A point's life lasts from its first observation, or the frame of its distance prior, to its last.
 void PathSmoother::find_lives() {
   lives_.assign(problem_.points.size(), std::nullopt);
   first_of_.assign(state_.poses.size() + 1, 0);
@@ -84,7 +84,7 @@ SmootherState PathSmoother::moved_by(const Eigen::VectorXd& shared, const PoseCh
   return moved;
 }
 
-/// The equations at the state, without the observations of points that these do not determine.
+/// Builds the equations at the current state, after removing observations of points that they do not determine.
 std::optional<SmootherSystem> PathSmoother::begun() {
   constexpr std::size_t few = 20;
   for (std::size_t num = 0; few * num <= state_.points.size(); ++num) {
@@ -99,8 +99,8 @@ std::optional<SmootherSystem> PathSmoother::begun() {
   return std::nullopt;
 }
 
-/// A step that lowers the cost, and the equations behind it: a whole one of Gauss and Newton, else a shorter one. None:
-/// none does.
+/// Makes a step that lowers the cost, a full Gauss–Newton step or else a shorter one, and returns the equations there.
+/// Empty if no step does.
 std::optional<SmootherSystem> PathSmoother::step_along(const SmootherSystem& system) {
   constexpr double min_share = 0.02;
   const int num = num_solved();
@@ -118,8 +118,8 @@ std::optional<SmootherSystem> PathSmoother::step_along(const SmootherSystem& sys
   return std::nullopt;
 }
 
-/// Where none does: what little determines, as the depth of a point that was seen along its ray, would go through the
-/// camera. Steps that are short there, until one lowers the cost; the next one may be three times as long.
+/// If none does, poorly determined components (such as the depth of a point seen along its ray) would pass through the
+/// camera. Makes damped steps, until one lowers the cost; the next one may be three times as long.
 std::optional<SmootherSystem> PathSmoother::short_step(double& share) {
   constexpr double least = 1e-4, shorter = 0.3, longer = 3.0;
   for (; share > least; share *= shorter) {
@@ -135,8 +135,8 @@ std::optional<SmootherSystem> PathSmoother::short_step(double& share) {
   return std::nullopt;
 }
 
-/// Until a whole step would gain less than `settled`, in σ² over all that is solved for; where only short ones lower
-/// the cost, until one of nearly the distances themselves gains nothing: what a whole one would is that point's at
+/// Iterates until a full step would gain less than `settled` in χ². If only damped steps lower the cost, until
+/// one of nearly the size of the distances gains nothing: a full step would then merely move a point to
 /// infinity.
 bool PathSmoother::settle(double settled) {
   constexpr int max_iterations = 25, max_short = 60;
@@ -185,13 +185,13 @@ bool PathSmoother::choose_observations() {
   return is_other;
 }
 
-/// With the observations that fit, until these are the same; then with what their errors share.
+/// Iterates with the observations that fit until their selection is stable; then models weights and autocorrelation.
 bool PathSmoother::settle_all() {
   constexpr double roughly = 0.3;
   if (!settle(roughly)) return false;
   const int max_choices = problem_.imu ? 6 : 3;
   for (int i = 0; i < max_choices; ++i) {
-    const bool has_other_walks = choose_walks();  // before observations are others
+    const bool has_other_walks = choose_walks();  // before the selection of observations changes
     const bool has_others = choose_observations(), has_other_steps = choose_steps();
     if (!has_others && !has_other_steps && !has_other_walks) break;
     if (!settle(roughly)) return false;
@@ -227,7 +227,7 @@ std::optional<SmoothedPath> PathSmoother::solve() {
 SmoothedPath PathSmoother::finished(const SmootherSystem& system) {
   SmoothedPath path = result(system);
   path.structure = residual_structure(path.residuals, state_.camera);
-  path.structure.autocorrelation = structure_.autocorrelation;  // that of the errors that were taken for independent
+  path.structure.autocorrelation = structure_.autocorrelation;  // that before the correlation was modelled
   path.structure.sigma_autocorrelation = structure_.sigma_autocorrelation;
   path.num_dropped = problem_.observations.size() - observations_.size();
   if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.given_in_world.has_value(); }))
@@ -266,7 +266,7 @@ void PathSmoother::fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath&
   path.chi2_per_dof /= std::max(num_numbers - num_solved, 0.5 * num_numbers + 1.0);
 }
 
-/// Times that are all late by the same move nothing that is seen: no observation shows it.
+/// A common delay of all times changes no observation: it is unobservable.
 void PathSmoother::add_clock(SmoothedPath& path) const {
   GivenNumber clock{.name = "clock"};
   for (std::size_t k = 0; k < state_.poses.size(); ++k) {
@@ -277,8 +277,8 @@ void PathSmoother::add_clock(SmoothedPath& path) const {
   path.given.push_back(clock);
 }
 
-/// How the motion's part of the cost falls along a direction of what is shared, poses and points following it: half of
-/// it, as a score.
+/// Minus half the derivative of the motion's cost along a direction of the shared parameters, with poses and points
+/// following it: its part of the score.
 double PathSmoother::motion_score(const SmootherSystem& system, const Eigen::VectorXd& direction,
                                   const PoseChain::Steps& at_rest) const {
   const PoseChain::Steps moved = system.chain.steps(direction);
@@ -290,8 +290,8 @@ double PathSmoother::motion_score(const SmootherSystem& system, const Eigen::Vec
   return score;
 }
 
-/// Of the scores the observations' and what is given, not the motion's: pixels' noise makes a still camera seem to
-/// move, by a longer lens a little less, and what that saves of accelerations grows with the number of frames.
+/// The scores contain observations and priors, not the motion: pixel noise makes a still camera appear to move, a
+/// little less with a longer lens, and the gain in accelerations would grow with the number of frames.
 PathSmoother::Asked PathSmoother::asked(const SmootherSystem& system) const {
   const int num = num_solved(), all = causes_at_ + num_causes, rest = all - num;
   const Eigen::MatrixXd B = system.chain.B.topLeftCorner(all, all).selfadjointView<Eigen::Lower>();

@@ -3,20 +3,20 @@
 
 #include "alidade/localize/path/path_system.h"
 
-// How much each point of the map counts. A corner made of two surfaces, one before the other, moves as no point does,
-// and so does a track that slides: their residuals are several times those of the others, for as long as they are seen.
-// Normal errors whose variance is a point's own, and inverse χ² about the usual one: a multivariate t of each point's
-// residuals (K. Lange, R. Little & J. Taylor, "Robust Statistical Modeling Using the t Distribution", JASA 84, 1989).
+// Weight of each point of the map. A corner formed by two surfaces at different depths moves like no point, and so does
+// a track that slides: their residuals are several times those of others, as long as they are seen. Model: normal
+// errors with a variance per point, with an inverse χ² prior about the typical one: multivariate t residuals of each
+// point (K. Lange, R. Little & J. Taylor, "Robust Statistical Modeling Using the t Distribution", JASA 84, 1989).
 
 namespace alidade {
 namespace {
 
 struct Squares {
-  double sum = 0.0, num = 0.0;  ///< Over σ²; numbers.
+  double sum = 0.0, num = 0.0;  ///< Σ of squares over σ²; their number.
   [[nodiscard]] double dof() const { return num - 3.0; }
 };
 
-/// The median of the points' mean squares. None of few points.
+/// Median of the points' mean squares. Empty for few points.
 std::optional<double> usual_of(std::span<const Squares> points) {
   constexpr double enough_numbers = 8.0;
   constexpr std::size_t enough_points = 12;
@@ -31,8 +31,8 @@ std::optional<double> usual_of(std::span<const Squares> points) {
 
 }  // namespace
 
-/// A point whose residuals are larger than the usual ones beyond chance counts by their own σ. Those of given points
-/// show an error of what was given, and keep their weight. Whether any has another σ than the stated one.
+/// Points whose residuals are significantly larger than typical get their own σ. Residuals of given points show an
+/// error of the given position, so these keep their weight. Returns whether any σ differs from the stated one.
 bool PathSmoother::weigh_points() {
   if (!problem_.weighs_points) return false;
   std::vector<Squares> squares(state_.points.size());
@@ -47,7 +47,7 @@ bool PathSmoother::weigh_points() {
   usual_variance_ = *usual;
   constexpr double prior_dof = 4.0, chance = 3.5, least_numbers = 6.0, most_lasting = 0.95;
   const double lag = std::clamp(structure_.autocorrelation, 0.0, most_lasting);
-  const double lasting = (1.0 + lag * lag) / (1.0 - lag * lag);  // of a mean square's variance
+  const double lasting = (1.0 + lag * lag) / (1.0 - lag * lag);  // of a mean square's variance, by autocorrelation
   bool is_any = false;
   for (std::size_t i = 0; i < squares.size(); ++i) {
     error_factors_[i] = 1.0;
@@ -61,9 +61,9 @@ bool PathSmoother::weigh_points() {
   return is_any;
 }
 
-/// Of a squared distance [px²] to where an observation is expected: the gate of the stated σ, or that of twice what the
-/// point's errors are found to be, where this is less. A match of another corner half a pixel away fits the stated σ,
-/// and counts as much as a hundred of a tenth of it.
+/// Gate for the squared distance [px²] to the prediction: that of the stated σ, or of twice the σ estimated for the
+/// point, whichever is smaller. A match of another corner half a pixel away fits the stated σ, and counts as much as a
+/// hundred matches with errors of a tenth of that.
 double PathSmoother::gate_of(const UsedObservation& observation, std::size_t point) const {
   constexpr double generous = 4.0;
   if (problem_.points[point].given_in_world) return problem_.filter.gate * observation.sigma_px * observation.sigma_px;

@@ -44,7 +44,7 @@ void PoseChain::add_square(const Eigen::VectorXd& v, double weight) {
   square_weight_ = weight;
 }
 
-/// B − Wᵀ W, and with the square that waits.
+/// B − Wᵀ W, together with the pending square.
 void PoseChain::take_from_border(const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>& W) {
   using panel_loops::panel;
   const int num_rows = static_cast<int>(W.rows()), num = num_rows + (square_weight_ != 0.0 ? 1 : 0);
@@ -69,7 +69,7 @@ void PoseChain::take_from_border(const Eigen::Matrix<double, Eigen::Dynamic, Eig
                               static_cast<std::size_t>(B.outerStride()));
 }
 
-/// What is left of the equations of those that stay.
+/// Schur complement for the remaining poses and the border.
 void PoseChain::take_out(const Step& step) {
   A.topLeftCorner<rest_dim, rest_dim>() -= step.W_poses.transpose() * step.W_poses;
   U.topLeftCorner(rest_dim, num_used_).noalias() -= step.W_poses.transpose() * step.W_border;
@@ -167,12 +167,12 @@ PoseChain::Steps PoseChain::steps(const Eigen::VectorXd& shared) const {
   return steps;
 }
 
-/// What is left of right-hand sides as poses and points leave, in the order in which they did: y of each step, and of
-/// the border what belongs to the shared parameters.
+/// Forward substitution in order of elimination: returns y of each step; `border` gets the part of the shared
+/// parameters.
 std::vector<Eigen::MatrixXd> PoseChain::forward(const Columns& W, Eigen::MatrixXd& border) const {
   const Eigen::Index num_columns = W.poses.front().cols();
   border = Eigen::MatrixXd::Zero(B.rows(), num_columns);
-  Eigen::MatrixXd poses = Eigen::MatrixXd::Zero(rest_dim, num_columns);  // of the window, but its first
+  Eigen::MatrixXd poses = Eigen::MatrixXd::Zero(rest_dim, num_columns);  // of the window, except its first
   Eigen::MatrixXd first = Eigen::MatrixXd::Zero(pose_dim, num_columns);
   std::vector<Eigen::MatrixXd> y;
   for (const Step& step : steps_) {
@@ -223,7 +223,7 @@ PoseChain::Columns PoseChain::solve(const Columns& W, int num_solved) const {
   return columns;
 }
 
-/// The covariance of the two poses of the window that stay, and of the border, from the last that left to the first.
+/// Covariance of the two remaining poses of the window and of the border, for the backward pass.
 struct PoseChain::Backward {
   Eigen::Matrix<double, rest_dim, rest_dim> P = Eigen::Matrix<double, rest_dim, rest_dim>::Zero();
   Eigen::MatrixXd C;                                         ///< Of the border.
@@ -231,7 +231,7 @@ struct PoseChain::Backward {
   Eigen::Matrix<double, rest_dim, Eigen::Dynamic> J;
   Eigen::MatrixXd J_border;
 
-  /// Of one that left: its covariance, and that with poses and border.
+  /// An eliminated pose or point: its covariance, and cross-covariances with poses and border.
   struct Back {
     Eigen::MatrixXd cov, with_poses, with_border, J;
   };
@@ -275,7 +275,7 @@ struct PoseChain::Backward {
     J.topRows<pose_dim>() = back.J;
   }
 
-  /// It has not entered yet.
+  /// Clears a point before the step at which it entered.
   void forget_point(int at) {
     C.middleRows<3>(at).setZero();
     C.middleCols<3>(at).setZero();

@@ -14,14 +14,14 @@ namespace {
 
 constexpr std::size_t min_looks = 3;
 
-/// A point seen from a smoothed pose.
+/// An observation of a point from a smoothed pose.
 struct Look {
   std::size_t frame = 0;  ///< Of the smoothed path.
   Eigen::Vector2d px;
   double sigma_px = 0.5;
 };
 
-/// The point nearest to all rays. None: they are parallel.
+/// The point closest to all rays in the least-squares sense. Empty if they are parallel.
 std::optional<Eigen::Vector3d> nearest_to_rays(const SmoothedPath& smoothed, std::span<const Look> looks) {
   Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -35,7 +35,7 @@ std::optional<Eigen::Vector3d> nearest_to_rays(const SmoothedPath& smoothed, std
     sum += off * pose.translation;
   }
   const Ldlt ldlt(across);
-  constexpr double min_angle2 = 1e-5;  // of what rays differ by, squared
+  constexpr double min_angle2 = 1e-5;  // squared angle between rays
   if (!(ldlt.min_pivot() > min_angle2 * static_cast<double>(looks.size()))) return std::nullopt;
   return ldlt.solve(sum);
 }
@@ -46,7 +46,7 @@ struct PlacedPoint {
   std::size_t num_fit = 0;
 };
 
-/// A Gauss–Newton step from `at`, of the looks within the gate; `gate` ∞: of all.
+/// One Gauss–Newton step from `at`, with the observations within the gate; `gate` ∞: with all.
 std::optional<PlacedPoint> placed_from(const SmoothedPath& smoothed, std::span<const Look> looks,
                                        const Eigen::Vector3d& at, double gate) {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -65,7 +65,7 @@ std::optional<PlacedPoint> placed_from(const SmoothedPath& smoothed, std::span<c
     const Eigen::Matrix<double, 2, 3> J = seen->J_px_point * R.transpose();
     H += J.transpose() * J / variance;
     g += J.transpose() * residual_px / variance;
-    Eigen::Matrix<double, 3, 6> J_pose;  // where a point goes that is fixed to the camera
+    Eigen::Matrix<double, 3, 6> J_pose;  // derivative of a point that is rigidly attached to the camera
     J_pose << R, -R * cross_matrix(point_in_cam);
     of_poses += J_pose * smoothed.cov[look.frame] * J_pose.transpose();
     ++placed.num_fit;
@@ -91,10 +91,10 @@ std::optional<PlacedPoint> placed_by(const SmoothedPath& smoothed, std::span<con
   return placed;
 }
 
-/// The observations of all points of a problem, and of those that no position fits, as they fit a path.
+/// Observations of all points of a problem, and of those that no position fits, marked by whether they fit a path.
 std::vector<UsedObservation> all_observations(const SmoothedPath& smoothed, std::span<const ObservationFrame> frames,
                                               const SmootherProblem& problem, const std::set<long>& misfits) {
-  const double gate = 4.0 * problem.filter.gate;  // poses and positions give way when all are solved for together
+  const double gate = 4.0 * problem.filter.gate;  // wide: poses and positions still change in the joint solve
   std::vector<UsedObservation> all;
   for (std::size_t k = 0; k < smoothed.world_from_cam.size(); ++k) {
     const Rigid3 cam_from_world = smoothed.world_from_cam[k].inverse();
@@ -111,7 +111,7 @@ std::vector<UsedObservation> all_observations(const SmoothedPath& smoothed, std:
   return all;
 }
 
-/// Points that most of their observations do not fit are where another path, or lens, had them.
+/// Removes points that most of their observations do not fit: they were estimated with another path or lens.
 void drop_misplaced(const SmoothedPath& smoothed, std::span<const ObservationFrame> frames, SmootherProblem& problem) {
   std::unordered_map<long, std::size_t> num_fit, num_seen;
   for (const PlacedResidual& residual : smoothed.residuals) ++num_fit[residual.id];

@@ -10,11 +10,11 @@
 namespace alidade {
 namespace {
 
-constexpr int dim = 7;  // of a keyframe: position in the world, rotation on the right, log of the scale
+constexpr int dim = 7;  // of a keyframe: position in the world, right rotation, log of the scale
 using Vector7 = Eigen::Vector<double, dim>;
 using Matrix7 = Eigen::Matrix<double, dim, dim>;
 
-/// An edge's error over its σ, and its derivatives by both keyframes.
+/// Error of an edge over its σ, and its derivatives with respect to both keyframes.
 struct EdgeError {
   Vector7 error;
   Matrix7 J_from, J_to;
@@ -46,7 +46,7 @@ EdgeError error_of(const SimilarityEdge& edge, const Similarity& from, const Sim
   return out;
 }
 
-/// Normal equations of all keyframes but the first.
+/// Normal equations of all keyframes except the first.
 class GraphStep {
  public:
   explicit GraphStep(std::size_t num_keyframes)
@@ -111,11 +111,11 @@ Similarity operator*(const Similarity& second, const Similarity& first) {
 
 std::optional<SimilarityGraph> settled_graph(std::vector<Similarity> world_from_keyframe,
                                              std::span<const SimilarityEdge> edges) {
-  constexpr double fits = 30.0, relaxed = 1.6, settled = 1e-6;  // χ² of seven components: 99.99 %
+  constexpr double fits = 30.0, relaxed = 1.6, settled = 1e-6;  // χ² with seven degrees of freedom: 99.99 %
   constexpr int max_steps = 80;
   SimilarityGraph graph{std::move(world_from_keyframe), std::vector<bool>(edges.size(), true)};
   if (graph.world_from_keyframe.size() < 2) return graph;
-  double wide = 0.0;  // loops weigh as if so many times `fits` were ordinary
+  double wide = 0.0;  // scale of the loop weights in units of `fits`; 0: not set
   for (int k = 0; k < max_steps; ++k) {
     GraphStep step(graph.world_from_keyframe.size());
     double worst = 0.0;

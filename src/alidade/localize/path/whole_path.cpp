@@ -14,8 +14,8 @@
 namespace alidade {
 namespace {
 
-/// What of each frame fits the smoothed path: frames that the filter had lost may be determined by their observations
-/// there.
+/// Marks which frames fit the smoothed path: frames that the filter had lost may be determined there by their
+/// observations.
 void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
                   Localization& result) {
   std::vector<std::size_t> num_fit(result.path.size(), 0);
@@ -32,10 +32,10 @@ void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::sp
   }
 }
 
-/// Without a target a second initial guess is tried where errors last from frame to frame: as they do on real films,
-/// and in the wrong one of two minima.
+/// Without a target, a second initial guess is tried if the errors are autocorrelated, as in real videos and in the
+/// wrong one of two minima.
 std::optional<SmoothedPath> best_path(const SmootherProblem& problem) {
-  constexpr std::size_t max_frames = 600;  // farther on all depths alike are no guess
+  constexpr std::size_t max_frames = 600;  // over longer paths, equal depths are not a useful guess
   auto smoothed = smoothed_path(problem);
   if (problem.gauge != PathGauge::similarity || problem.world_from_cam.size() > max_frames) return smoothed;
   if (smoothed && !smoothed->structure.is_autocorrelated()) return smoothed;
@@ -47,8 +47,8 @@ std::optional<SmoothedPath> best_path(const SmootherProblem& problem) {
   return is_better ? std::move(other) : std::move(smoothed);
 }
 
-/// The path of `result` smoothed. None, and no change, where that does not settle, or on a path that next to nothing
-/// fits.
+/// Smooths the path of `result`. Empty, without any change, if that does not converge, or if next to nothing fits the
+/// path.
 std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<const ObservationFrame> frames,
                                    Localization& result) {
   auto smoothed = best_path(problem);
@@ -64,7 +64,7 @@ std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<con
   return smoothed;
 }
 
-/// The problem begins where another's solution is, larger by a scale, with its points' weights.
+/// Starts the problem at the solution of another one, multiplied by `scale`, with its point weights.
 void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& problem) {
   for (std::size_t k = 0; k < problem.world_from_cam.size(); ++k) {
     problem.world_from_cam[k] = smoothed.world_from_cam[k];
@@ -84,7 +84,7 @@ void begin_at(const SmoothedPath& smoothed, double scale, SmootherProblem& probl
   problem.points = std::move(points);
 }
 
-/// With its loops closed, where that settles and fits as well as without.
+/// Smooths with closed loops, if that converges and fits as well as without; else without.
 std::optional<SmoothedPath> smooth_with_loops(const Recording& recording, SmootherProblem& problem,
                                               Localization& result) {
   const std::vector<ObservationFrame>& frames = recording.frames.frames();
@@ -109,10 +109,10 @@ std::optional<SmoothedPath> smooth_with_loops(const Recording& recording, Smooth
   return smoothed;
 }
 
-/// Whether the points of a problem do not hold many of the frames though enough is seen there: a filter without a
-/// target that knows few depths may leave half of a path to the motion that was supposed.
+/// Whether too many frames have too few of the problem's points although enough is seen there: without a target, a
+/// filter that knows few depths may leave half of a path to the motion model.
 bool leaves_frames(const SmootherProblem& problem, std::span<const ObservationFrame> frames) {
-  constexpr std::size_t many = 20;  // one frame of so many
+  constexpr std::size_t many = 20;  // one frame in 20
   std::vector<std::size_t> num_of_map(problem.world_from_cam.size(), 0);
   for (const UsedObservation& each : problem.observations) ++num_of_map[each.frame];
   std::size_t num_left = 0;
@@ -128,14 +128,14 @@ bool drops_much(const SmoothedPath& smoothed, const SmootherProblem& problem) {
   return few * smoothed.num_dropped > problem.observations.size();
 }
 
-/// Whether a lens is estimated, and much that the filter saw by another one does not fit it.
+/// Whether a lens was estimated, and much of what the filter observed with the former one does not fit.
 bool has_other_lens(const SmoothedPath& smoothed, const SmootherProblem& problem) {
   return smoothed.is_lens_freed && drops_much(smoothed, problem);
 }
 
-/// After a new beginning the filter knows few depths, often those of the target alone, which a path by a wrong lens
-/// fits as well: it is solved again with all that it sees, and with what fits another lens where that is estimated, or
-/// the better path. Where that does not settle, nothing is explained.
+/// After a restart the filter knows few depths, often those of the target only, which a path with a wrong lens fits as
+/// well. So solves again with everything observed; repeatedly, with what fits the new lens, if one is estimated, or the
+/// better path. If that does not converge, all frames count as unexplained.
 void solve_with_remaining(std::span<const ObservationFrame> frames, bool frees_lens, SmootherProblem& given,
                           SmoothedPath& smoothed, Localization& result) {
   constexpr int most = 3;
@@ -156,8 +156,8 @@ void solve_with_remaining(std::span<const ObservationFrame> frames, bool frees_l
   }
 }
 
-/// Matches of images have a least σ, what patches of real things are off by. Where what is left over is far below it,
-/// as of rendered ones, it is taken for two and a half times that, and the path is solved once more.
+/// Matches of images have a σ floor, the error of patches of real scenes. If the residuals are far below it, as for
+/// rendered images, sets σ to 2.5 times the residuals' and solves once more.
 void solve_with_found_sigma(std::span<const ObservationFrame> frames, const LocalizeConfig& config,
                             SmootherProblem& given, SmoothedPath& smoothed, Localization& result) {
   constexpr double far_below = 0.1, generous = 2.5;  // squares over σ²
@@ -179,8 +179,8 @@ void solve_with_found_sigma(std::span<const ObservationFrame> frames, const Loca
   given = std::move(problem);
 }
 
-/// Each point's distance from where it was first seen is believed to be what it is now, so vaguely that all of them
-/// together say the scale to `sigma_rel`, and nothing else.
+/// Sets a prior on each point's distance from the frame where it was first seen, at its current value, so weak that all
+/// together determine the scale to `sigma_rel`, and nothing else.
 void believe_distances(double sigma_rel, SmootherProblem& problem) {
   const double sigma_of_one = sigma_rel * std::sqrt(static_cast<double>(problem.points.size()));
   for (SmootherPoint& point : problem.points) {
@@ -189,7 +189,7 @@ void believe_distances(double sigma_rel, SmootherProblem& problem) {
   }
 }
 
-/// A path up to scale, once more where sensors beside the camera say how long it is. What a unit was before in metres.
+/// Solves a path up to scale again, in metres, if other sensors determine its scale. Returns metres per former unit.
 double solve_in_metres(const Recording& recording, const LocalizeConfig& config, SmootherProblem& given,
                        SmoothedPath& smoothed, Localization& result) {
   if (!config.target.points.empty()) return 1.0;
@@ -219,8 +219,8 @@ std::vector<TimedPose> poses_of(const SmootherProblem& problem, const SmoothedPa
   return poses;
 }
 
-/// An IMU as the smoother takes it, from its first estimate on. Its clock and rotation may still move: what they were
-/// found by is in the equations again.
+/// The IMU as input of the smoother, initialised from its alignment. Clock and rotation stay free: the data that gave
+/// their first estimate are in the equations again.
 SmootherImu imu_to_solve(const Imu& given, ImuAlignment alignment, std::span<const double> t_s) {
   constexpr double found_rotation_rad = 0.3, found_position_m = 0.1, found_late_s = 0.02, any_clock_rate = 5e-5;
   constexpr double node_apart_s = 10.0, most_nodes = 9.0;
@@ -244,7 +244,7 @@ SmootherImu imu_to_solve(const Imu& given, ImuAlignment alignment, std::span<con
   return imu;
 }
 
-/// What a path found of an IMU, in its own axes.
+/// Copies the estimate of an IMU to its own axes.
 void fill_estimate(const SmoothedImu& found, ImuEstimate& estimate) {
   const ImuState& state = found.state;
   const Eigen::Matrix3d imu_from_cam = estimate.cam_from_imu.rotation.conjugate().toRotationMatrix();
@@ -277,23 +277,23 @@ void fill_estimate(const SmoothedImu& found, ImuEstimate& estimate) {
   estimate.num_missing = found.num_missing;
 }
 
-/// Gravity, the scale factor and the scales of the axes explain each other's errors: as far
-/// as all are from what was given, they disagree.
+/// Errors of gravity, the scale factor and the axes' scales compensate each other: their joint deviation from the given
+/// values, in σ.
 double gravity_sigmas(const ImuState& state, const Imu& given) {
   return std::hypot((state.gravity_in_world.norm() - given.gravity_m_s2) / given.sigma_gravity_m_s2,
                     state.force_scale / given.noise.sigma_force_scale,
                     state.force_axes.diagonal().norm() / given.noise.sigma_axes);
 }
 
-/// By how much the axes are otherwise than given, the most of one number, in its σ.
+/// Largest deviation of the axes from the given ones: of one component, in its σ; `most`: in size.
 double axes_sigmas(const ImuState& state, const Imu& given, double& most) {
   most = std::max(state.force_axes.cwiseAbs().maxCoeff(), state.rate_axes.cwiseAbs().maxCoeff());
   const Eigen::Matrix3d rates = state.rate_axes.cwiseAbs();
-  const double between = std::max({rates(0, 1), rates(0, 2), rates(1, 2)});  // of which σ is smaller
+  const double between = std::max({rates(0, 1), rates(0, 2), rates(1, 2)});  // these have a smaller σ
   return std::max(most, std::numbers::sqrt2 * between) / given.noise.sigma_axes;
 }
 
-/// Whether a path with an IMU is one: its scale is determined, and its noise not many times that of any.
+/// Whether a path with an IMU is usable: its scale is determined, and its noise is plausible.
 ImuFault fault_of(const SmoothedImu& found, bool is_in_metres) {
   constexpr double useless = 0.2, any_noise = 30.0;
   if (std::max(found.rate_noise_factor, found.force_noise_factor) > any_noise ||
@@ -302,7 +302,7 @@ ImuFault fault_of(const SmoothedImu& found, bool is_in_metres) {
   return is_in_metres || found.sigma_scale < useless ? ImuFault::none : ImuFault::still;
 }
 
-/// A path once more with an IMU's rates and forces. What a unit was before in metres.
+/// Solves a path again with an IMU's rates and forces. Returns metres per former unit.
 double solve_with_imu(const Recording& recording, const LocalizeConfig& config, SmootherProblem problem,
                       SmoothedPath& smoothed, Localization& result) {
   if (!config.imu) return 1.0;
@@ -316,7 +316,7 @@ double solve_with_imu(const Recording& recording, const LocalizeConfig& config, 
   const bool has_target = !config.target.points.empty(), is_in_metres = has_target || result.is_scale_read;
   const double scale = is_in_metres ? 1.0 : estimate.scale;
   begin_at(smoothed, scale, problem);
-  constexpr double hardly = 1.0;  // of all distances together
+  constexpr double hardly = 1.0;  // relative, of all distances together
   if (!is_in_metres) believe_distances(hardly, problem);
   if (problem.gauge == PathGauge::similarity) problem.gauge = PathGauge::motion;
   problem.imu = imu_to_solve(imu, std::move(alignment), problem.t_s);
@@ -359,7 +359,7 @@ std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEn
   const bool knows_few = recording.record.num_begun() > 1 ||
                          (problem->gauge == PathGauge::similarity && leaves_frames(*problem, frames.frames()));
   const bool lacks_points = !result.is_of_images && knows_few;
-  // Whoever asks for less of the lens gets the path by that.
+  // If less of the lens is requested, the path uses just that.
   const bool frees_lens = result.is_of_images || config.distortion == DistortionVariant::full;
   problem->frees_lens = frees_lens && !lacks_points;
   problem->compares_causes = !result.is_of_images;

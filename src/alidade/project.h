@@ -39,10 +39,10 @@ struct BeamProjection {
   enum class Status { projected };
   Status status = Status::projected;
   std::vector<ProjectedReading> readings;  ///< One per range.
-  Beam beam;                               ///< As used: for another lens, without its covariance with the lens.
+  Beam beam;                               ///< Beam as used: for another lens, without its covariance with the lens.
   Camera camera;
   std::vector<Assumption> assumed;
-  Counts counts;  ///< Of readings; used: those in the camera's view.
+  Counts counts;  ///< Counts of readings; used: those in the camera's view.
   Verdict verdict;
 };
 
@@ -57,7 +57,7 @@ struct HeadProjection {
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Matrix<double, 3, 4> M;  ///< (u, v, 1) ~ M (X, Y, Z, 1), the point in the world; no distortion.
   Eigen::Vector3d cam_centre_in_world = Eigen::Vector3d::Zero();
-  std::optional<BeamPixel> pixel;  ///< Of the point, with distortion; none: not in view, or no point given.
+  std::optional<BeamPixel> pixel;  ///< Pixel of the point, with distortion; none: not in view, or no point given.
 };
 
 /// The heads of a rig at their encoder readings, and the pixels at which they see a point.
@@ -65,11 +65,11 @@ struct RigProjection {
   enum class Status { projected };
   Status status = Status::projected;
   std::vector<HeadProjection> heads;
-  std::optional<Eigen::Vector3d> point_in_world;  ///< As given. [m]
+  std::optional<Eigen::Vector3d> point_in_world;  ///< The point as given. [m]
   /// Covariance of the point by triangulation from the heads that see it: due to encoder noise and errors of rig and
   /// lenses, for exact pixels. None if fewer than two heads see it. [m²]
   std::optional<Eigen::Matrix3d> point_cov;
-  Counts counts;  ///< Of heads.
+  Counts counts;  ///< Counts of heads.
   Verdict verdict;
 };
 

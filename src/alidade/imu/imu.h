@@ -25,16 +25,16 @@ struct ImuNoise {
   double force_density = 3e-3;       ///< [m/s²/√Hz]
   double rate_walk = 2e-5;           ///< [rad/s²/√Hz]
   double force_walk = 1e-3;          ///< [m/s³/√Hz]
-  double sigma_rate_bias = 0.02;     ///< Of the initial bias. [rad/s]
-  double sigma_force_bias = 0.3;     ///< Of the initial bias. [m/s²]
-  double sigma_force_scale = 0.003;  ///< Of the accelerometer's scale factor, relative; common to all its readings.
-  double sigma_axes = 0.01;          ///< Of scale differences and non-orthogonality of the axes, for either sensor.
+  double sigma_rate_bias = 0.02;     ///< σ of the initial bias. [rad/s]
+  double sigma_force_bias = 0.3;     ///< σ of the initial bias. [m/s²]
+  double sigma_force_scale = 0.003;  ///< σ of the accelerometer's scale factor, relative; common to all its readings.
+  double sigma_axes = 0.01;          ///< σ of the axes' scale differences and non-orthogonality, for either sensor.
 };
 
 /// How an IMU is mounted relative to a camera.
 struct ImuMounting {
   Rigid3 cam_from_imu;
-  double sigma_rotation_rad = 0.02;  ///< About each axis,
+  double sigma_rotation_rad = 0.02;  ///< σ about each axis,
   double sigma_position_m = 0.01;    ///< and of each coordinate of its position.
 };
 

@@ -136,7 +136,7 @@ struct LocalizeConfig {
   std::optional<LocalizeStart> start = {};   ///< None: by the target, else the first camera is the world, up to scale.
   LocalizeTarget target = {};
   std::optional<SavedMap> map = {};  ///< Map of an earlier run, used instead of a target; the path is in its frame.
-  std::vector<DepthReading> depth_readings = {};  ///< In order of time: scale without a target, else a check of it.
+  std::vector<DepthReading> depth_readings = {};  ///< In order of time; scale without a target, else a check of it.
   /// Position of the depth sensor in the camera's frame; none: at the camera's centre. σ of each coordinate: included.
   std::optional<Eigen::Vector3d> depth_arm_m = {};
   std::optional<double> sigma_depth_arm_m = {};

@@ -30,7 +30,7 @@ enum class FrameEvent {
 /// Source of σ of a pixel coordinate.
 enum class SigmaPxFrom {
   usual,      ///< The default: none was given, and the observations do not contradict it.
-  given,      ///< In the config.
+  given,      ///< Given in the config.
   rows,       ///< Each observation states its own.
   residuals,  ///< Estimated from the residuals.
 };
@@ -43,9 +43,9 @@ struct PathStep {
   FrameEvent event = FrameEvent::waiting;
   Rigid3 world_from_cam;
   Eigen::Matrix<double, 6, 6> cov =
-      Eigen::Matrix<double, 6, 6>::Zero();  ///< Of the right perturbation: translation [m], rotation [rad].
+      Eigen::Matrix<double, 6, 6>::Zero();  ///< Covariance of the right perturbation: translation [m], rotation [rad].
   std::size_t num_seen = 0, num_tracked = 0, num_gated = 0, num_features = 0;
-  std::size_t num_known = 0, num_known_gated = 0;  ///< Of the points used and gated, the target's.
+  std::size_t num_known = 0, num_known_gated = 0;  ///< Points of the target among those used and gated.
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
   double seconds = 0.0;
 
@@ -83,7 +83,7 @@ struct GivenNumber {
 struct SensorScale {
   std::string sensor;      ///< "depth sensor", "rangefinder", "odometry", "IMU"
   double scale = 1.0;      ///< Metres per unit of the path without it; 1 where a target gave correct metres.
-  double sigma_rel = 0.0;  ///< Of the scale, relative. 0: the readings do not determine it.
+  double sigma_rel = 0.0;  ///< σ of the scale, relative. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
   bool is_in_time = true;  ///< Some readings lie within the time span of the path.
   double late_s = 0.0;     ///< Sensor clock minus camera clock, where they differ: corrected.
@@ -119,7 +119,7 @@ struct RadialStructure {
 /// Dependence between residuals that should be independent.
 struct ResidualStructure {
   double autocorrelation = 0.0;        ///< Correlation of a point's residuals in consecutive frames.
-  double sigma_autocorrelation = 1.0;  ///< Of that, for independent residuals.
+  double sigma_autocorrelation = 1.0;  ///< σ of that correlation for independent residuals.
   /// Whether that is significant and large enough to matter.
   [[nodiscard]] bool is_autocorrelated() const {
     return autocorrelation > 0.25 && autocorrelation > 4.0 * sigma_autocorrelation;
@@ -140,7 +140,7 @@ struct MissingFrames {
 /// points.
 struct MovedPoints {
   std::size_t num = 0, num_judged = 0;  ///< Points that moved, of those that could be judged.
-  std::size_t num_as_one = 0;           ///< Of the points that moved, those that moved together.
+  std::size_t num_as_one = 0;           ///< Moved points that moved together.
   double median_m = 0.0;                ///< Median distance; 0: not known.
   bool is_left_out = true;              ///< The path is estimated from the others alone.
 };
@@ -148,8 +148,8 @@ struct MovedPoints {
 /// The group of a target's points that most clearly lies elsewhere than given relative to the rest. The mean of a group
 /// shows a shift that is within σ of each single point.
 struct MovedPart {
-  std::size_t num = 0, num_given = 0;  ///< In the group; of those in the map (0: too few to test).
-  double shift_m = 0.0, chi2 = 0.0;    ///< Of the shift (3 degrees of freedom) that explains most.
+  std::size_t num = 0, num_given = 0;  ///< Points in the group; target points in the map (0: too few to test).
+  double shift_m = 0.0, chi2 = 0.0;    ///< Shift that explains most, and its χ² (3 degrees of freedom).
   double spread = 0.0;                 ///< Largest variance of all errors along a direction, over σ²: 1 if correct,
   double spread_limit = 1e9;           ///< and its 99.9 % limit.
 };
@@ -179,11 +179,11 @@ struct PathError {
 struct Localization {
   std::vector<PathStep> path;  ///< One per frame.
   std::vector<MapPoint> map;   ///< The final map.
-  SavedMap saved_map;          ///< For another run to start in: the points whose position is known well enough.
+  SavedMap saved_map;          ///< Map for another run to start in: points whose position is known well enough.
   bool scale_known = false;
   bool is_scale_read = false;              ///< Known by `sensor_scales`, not by a target.
   std::vector<SensorScale> sensor_scales;  ///< One per sensor with readings.
-  double sigma_target_scale = 0.0;         ///< Of the scale by the positions of the target's points, relative.
+  double sigma_target_scale = 0.0;         ///< σ of the scale by the positions of the target's points, relative.
   std::optional<ImuEstimate> imu;          ///< If one was given.
   bool has_target = false;                 ///< Known points were given,
   bool is_in_map = false;                  ///< as a saved map,
@@ -193,10 +193,10 @@ struct Localization {
   bool lacks_circle = false;  ///< A circular mask was requested, but no image shows a circle: nothing is masked.
   double still_share = 0.0;   ///< Share of the image with edges that never move while the scene does: masked.
   double sigma_px =
-      std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that states none; for images the least of any.
+      std::numeric_limits<double>::quiet_NaN();  ///< σ of an observation that states none; for images the least.
   SigmaPxFrom sigma_px_from = SigmaPxFrom::usual;
   std::size_t num_lost = 0;            ///< Frames whose pose no observations constrain: waiting or predicted.
-  std::size_t num_repeated = 0;        ///< Of these, frames that repeat the last one while the camera moves.
+  std::size_t num_repeated = 0;        ///< Lost frames that repeat the last one while the camera moves.
   std::vector<MissingFrames> missing;  ///< Times counted from frame to frame are wrong at these gaps.
   std::vector<int> frame_pattern;      ///< Periods from frame to frame, repeating, if `missing` has a pattern.
   std::size_t num_restarts = 0;
@@ -207,19 +207,19 @@ struct Localization {
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
   /// Mean squared shift of the target's points in the map from their given positions, over σ², per coordinate.
   double known_shift = std::numeric_limits<double>::quiet_NaN();
-  MovedPart moved_part;       ///< Of the target, for tables.
-  RadialStructure radial;     ///< Of the residuals after the update: reveals a wrong lens.
+  MovedPart moved_part;       ///< Moved group of the target's points (tables only).
+  RadialStructure radial;     ///< Radial structure of the residuals after the update: reveals a wrong lens.
   std::size_t num_alike = 1;  ///< Candidates for the target in one image, if initialisation failed because of them.
-  Camera camera;              ///< As used at the end.
+  Camera camera;              ///< The camera as used at the end.
   std::vector<std::string> lens_params;  ///< The camera's parameters that were estimated,
   Eigen::VectorXd sigma_lens;            ///< and their σ.
   std::optional<Camera> given_camera;    ///< If the observations contradict it: the lens was estimated without it.
-  std::vector<TimedPose> truth;          ///< As given.
+  std::vector<TimedPose> truth;          ///< The truth as given.
   PathError error;                       ///< If there is truth.
   bool is_scale_given = true;            ///< As in LocalizeTarget; also true if the config has its σ.
   bool is_board = false;                 ///< The target is a printed board, visible from one side.
   bool is_behind = false;                ///< Most poses lie behind the flat target, where it is not visible.
-  ResidualStructure residuals;           ///< For a smoothed path.
+  ResidualStructure residuals;           ///< Structure of the residuals of a smoothed path.
   bool is_smoothed = false;         ///< Path and map are from all observations jointly, not from earlier ones only.
   std::size_t smoothed_every = 1;   ///< One of so many frames was solved for, the others follow: long recordings.
   std::size_t num_unexplained = 0;  ///< Frames of a smoothed path whose observations mostly do not fit it.
@@ -232,7 +232,7 @@ struct Localization {
   std::vector<GivenNumber> given;  ///< What was given, and its effect on the path.
   double lens_pull = 0.0;          ///< For an estimated lens: largest change from a given value, in its given σ.
 
-  Counts counts;  ///< Of frames, and rejected rows.
+  Counts counts;  ///< Counts of frames, and rejected rows.
   std::vector<Assumption> assumed;
   Verdict verdict;
 };

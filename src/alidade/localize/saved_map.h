@@ -17,7 +17,7 @@ struct SavedLook {
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  ///< From the patch's centre to the point.
   Rigid3 world_from_first_cam;
   Eigen::Matrix<double, 3, 2> surface_in_world = Eigen::Matrix<double, 3, 2>::Zero();  ///< Two tangent directions.
-  Eigen::Matrix2d J_first_px_surface = Eigen::Matrix2d::Identity();  ///< Of its first pixel by a move along them.
+  Eigen::Matrix2d J_first_px_surface = Eigen::Matrix2d::Identity();  ///< Derivative of its first pixel along them.
 };
 
 struct SavedPoint {
@@ -46,7 +46,7 @@ struct SavedMap {
   bool is_in_metres = false;
   std::vector<SavedPoint> points = {};        ///< Their covariances exclude the frame's errors.
   std::optional<SavedFrame> frame = {};       ///< None: not known.
-  std::vector<SavedKeyframe> keyframes = {};  ///< For maps of images.
+  std::vector<SavedKeyframe> keyframes = {};  ///< Keyframes of a map of images.
 };
 
 ALIDADE_PUBLIC_END

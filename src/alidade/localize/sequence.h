@@ -43,7 +43,7 @@ using NextImage = std::function<bool(cv::Mat& grey, long& frame, double& t_s)>;
 /// Images in order of time.
 struct ImageStream {
   NextImage next;
-  std::size_t num_images = 0;  ///< For progress; 0: not known.
+  std::size_t num_images = 0;  ///< Total, for progress reports; 0: not known.
   /// Rate by the video's own times so far [frames/s], where a given rate was used instead of them; 0: none.
   std::function<double()> own_rate_hz = {};
 };

@@ -15,7 +15,7 @@ ALIDADE_PUBLIC_BEGIN
 struct KnownPoint {
   long id = 0;
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
-  double sigma_m = 0.001;  ///< Of each coordinate.
+  double sigma_m = 0.001;  ///< σ of each coordinate.
 };
 
 /// A small grey image of a point as first seen; the point is at its centre.
@@ -32,7 +32,7 @@ struct LocalizeTarget {
   std::optional<Board> board = {};                  ///< Printed: visible from one side.
   std::vector<GreyPatch> patches = {};              ///< One per point.
   bool is_scale_given = true;                       ///< Whether `sigma_scale`, or the σ of the points, is known.
-  double sigma_scale = 0.0;                         ///< Of the target's size, relative, such as a print's.
+  double sigma_scale = 0.0;                         ///< σ of the target's size, relative, such as a print's.
   bool seen_from_plus_z = false;                    ///< Coplanar points are seen from +z; false: from −z.
 };
 

@@ -21,7 +21,7 @@ struct MatchedPair {
 
 /// Features of photos of one size, and matches between them. Any number of the matches may be wrong.
 struct MatchedPhotos {
-  int width_px = 0, height_px = 0;                     ///< Of all photos that have features.
+  int width_px = 0, height_px = 0;                     ///< Size of all photos that have features.
   std::vector<std::string> names;                      ///< One per photo.
   std::vector<std::vector<Eigen::Vector2d>> features;  ///< [px]
   std::vector<MatchedPair> pairs;                      ///< Each pair of photos once, a before b.

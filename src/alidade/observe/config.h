@@ -37,7 +37,7 @@ struct ObserveConfig {
   std::vector<std::string> estimate = {};
   /// Initial guess and lens: pixels are undistorted with it unless distortion is estimated.
   std::optional<Camera> camera = {};
-  int width_px = 0, height_px = 0;  ///< Of the images; 0: the camera's, else the smallest that contains all pixels.
+  int width_px = 0, height_px = 0;  ///< Image size; 0: the camera's, else the smallest that contains all pixels.
   std::optional<Eigen::Vector4d> start =
       {};  ///< Initial guess of fx, fy, cx, cy [px]; none: from the camera, else from the data.
   FangProfile profile = FangProfile::kalman;
@@ -50,8 +50,8 @@ struct ObserveConfig {
   std::optional<double> sigma_angle_rad = {};   ///< σ of measured angles and attitudes, if the rotation is noisy.
   std::optional<double> sigma_rate_rad_per_s = {};  ///< σ of measured rates.
   double sigma_range_m = 0.002;
-  std::optional<double> sigma_scale = {};     ///< Of the scale of angles or rates, relative; 0: exact; none: the log's.
-  std::optional<double> sigma_parallax = {};  ///< Of the centre's offset along the view, over the points' distance.
+  std::optional<double> sigma_scale = {};     ///< σ of the angle or rate scale, relative; 0: exact; none: the log's.
+  std::optional<double> sigma_parallax = {};  ///< σ of the centre's offset along the view, over the points' distance.
   double window_s = 6.0;                      ///< Duration for ObserveMethod::window.
   double max_gap_s = 0.25;  ///< A longer gap in a log of rates starts a segment; in one of angles it gives no rate.
   int keep_rows = 100000;   ///< Rows that an Observer keeps: at least this many, at most twice as many.

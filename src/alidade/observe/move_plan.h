@@ -18,7 +18,7 @@ struct ObservedNow {
   int width_px = 0, height_px = 0;
   Eigen::Vector4d k_px{0.0, 0.0, 0.0, 0.0};  ///< fx, fy, cx, cy.
   Eigen::Matrix4d cov_px2 = Eigen::Matrix4d::Zero();
-  std::vector<Eigen::Vector2d> points_px;  ///< In view now.
+  std::vector<Eigen::Vector2d> points_px;  ///< Points in view now.
   double sigma_px = 0.3;
   double frames_per_s = 30.0;
   /// σ of fx, fy, cx, cy for independent pixel errors and exact given values; zero: use cov_px2.

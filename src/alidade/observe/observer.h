@@ -17,7 +17,7 @@ ALIDADE_PUBLIC_BEGIN
 struct ObserveStep {
   double t_s = 0.0;
   IntrinsicsEstimate estimate;
-  Eigen::Vector3d rate_rad_per_s = Eigen::Vector3d::Zero();            ///< In the camera frame.
+  Eigen::Vector3d rate_rad_per_s = Eigen::Vector3d::Zero();            ///< Angular rate in the camera frame.
   Eigen::Quaterniond start_from_cam = Eigen::Quaterniond::Identity();  ///< Rotation since the first row of the segment.
   std::optional<TrueIntrinsics> truth = {};
 };

@@ -80,17 +80,17 @@ struct RotatedPhoto {
 
 /// Test for translation of the camera's centre: residuals along the epipolar lines minus those across them.
 struct ParallaxTest {
-  double z = 0.0;  ///< For the pair of photos with the largest z.
+  double z = 0.0;  ///< Score for the pair of photos with the largest z.
   int photo_a = -1, photo_b = -1;
-  double rms_px = 0.0;    ///< Over all pairs.
-  double relative = 0.0;  ///< Over the points' distance, per radian of rotation.
+  double rms_px = 0.0;    ///< RMS over all pairs.
+  double relative = 0.0;  ///< Translation over the points' distance, per radian of rotation.
 };
 
 /// Numbers of matches between photos.
 struct MatchCounts {
-  std::size_t given = 0;      ///< Between photos that are used.
-  std::size_t agreeing = 0;   ///< Consistent with one homography per pair.
-  std::size_t kept = 0;       ///< Consistent with one camera.
+  std::size_t given = 0;      ///< Matches between photos that are used.
+  std::size_t agreeing = 0;   ///< Matches consistent with one homography per pair.
+  std::size_t kept = 0;       ///< Matches consistent with one camera.
   std::size_t burned_in = 0;  ///< Not counted above: matches of what is fixed in the image, a date or a logo.
 };
 
@@ -106,21 +106,21 @@ struct ObserveReport {
   };
   Status status = Status::too_few_data;
   Verdict verdict;
-  Counts counts;  ///< Of rows, or photos.
+  Counts counts;  ///< Counts of rows, or of photos.
   std::vector<Assumption> assumed;
 
-  int width_px = 0, height_px = 0;  ///< Of the images.
+  int width_px = 0, height_px = 0;  ///< Size of the images.
   bool size_is_guessed = false;     ///< No size was given: the smallest that contains all pixels.
-  Camera camera;                    ///< At the end of the log, with its covariance.
+  Camera camera;                    ///< The camera at the end of the log, with its covariance.
   /// fx, fy, cx, cy [px], then what else was estimated: k1, …, mount_x_rad…, delay_s, lever_x_m….
   std::vector<ObservedQuantity> quantities;
-  Eigen::MatrixXd covariance;  ///< Of the quantities, in their order and units.
+  Eigen::MatrixXd covariance;  ///< Covariance of the quantities, in their order and units.
 
-  RotationLog log;                        ///< As used: undistorted if a lens is given. For photos, one row each.
+  RotationLog log;                        ///< Log as used: undistorted if a lens is given. For photos, one row each.
   std::vector<IntrinsicsEstimate> steps;  ///< One per row.
   std::vector<ObserveNote> events;
   double sigma_px = 0.0;           ///< σ of a pixel coordinate.
-  bool sigma_is_estimated = true;  ///< From the residuals, not given.
+  bool sigma_is_estimated = true;  ///< Estimated from the residuals, not given.
   double nis_per_dof = 0.0;
   ObserveMotion motion;
   /// Longest interval with constant intrinsics: bound and residuals refer to its rows.

@@ -18,7 +18,7 @@ class SeenFrames {
   /// `num_images` in the run; 0: not known. Without `keeps_images` only the searches are stored, not the images.
   SeenFrames(std::size_t num_images, bool keeps_images);
 
-  /// For LocalizeConfig::watch_image.
+  /// To be called by LocalizeConfig::watch_image.
   void offer(double t_s, const cv::Mat& image, std::span<const ObservationTried> tried);
   /// Inserts the tables `frames` (t_s, name of the image, its size) and `observations` (expected pixel of a point,
   /// covariance of the innovation, detected pixel) before the others, and adds the images. It does nothing if no image
@@ -31,7 +31,7 @@ class SeenFrames {
   struct Frame {
     double t_s;
     std::string name;
-    int width_px, height_px;  ///< Of the image that the pixels refer to; the JPEG may be smaller.
+    int width_px, height_px;  ///< Size of the image that the pixels refer to; the JPEG may be smaller.
     std::vector<ObservationTried> tried;
   };
   std::size_t count_ = 0, every_ = 1;

@@ -17,7 +17,7 @@ struct ObservationsOptions {
   bool skip_bad = false;  ///< Rows that are wrong are skipped and listed.
   double rate_hz = 0.0;   ///< If positive, a frame's time is its number over this rate.
   int width_px = 0,
-      height_px = 0;  ///< Of the camera. Rejected: observations farther outside than half the image.
+      height_px = 0;  ///< The camera's size. Rejected: observations farther outside than half the image.
 };
 
 /// Reads `frame,t_s,point_id,u_px,v_px`, one observation per row. An empty `point_id` marks a frame without

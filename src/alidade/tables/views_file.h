@@ -24,7 +24,7 @@ struct ViewsFile {
 
 struct ViewsOptions {
   bool skip_bad = false;  ///< Wrong rows are rejected and listed.
-  int num_points = 0;     ///< Of the board.
+  int num_points = 0;     ///< Number of points of the board.
 };
 
 /// Reads `view,board,head,pan_rad,tilt_rad` with `corner,u,v` (also `u_px,v_px`), one row per corner, or with `photo`,

@@ -33,8 +33,8 @@ enum class ImuFault {
 /// with σ of each component.
 struct ImuEstimate {
   ImuFault fault = ImuFault::none;
-  double ratio = 1.0;      ///< Of a wrong unit: camera over IMU, or mean force over gravity.
-  double angle_rad = 0.0;  ///< Between the given mounting and the one that the rotations indicate.
+  double ratio = 1.0;      ///< Ratio of a wrong unit: camera over IMU, or mean force over gravity.
+  double angle_rad = 0.0;  ///< Angle between the given mounting and the one that the rotations indicate.
   bool is_mounting_given = true;
   Rigid3 cam_from_imu;
   Eigen::Vector3d sigma_rotation_rad = Eigen::Vector3d::Zero(), sigma_position_m = Eigen::Vector3d::Zero();
@@ -43,7 +43,7 @@ struct ImuEstimate {
       0.0;  ///< Joint deviation of gravity's magnitude and the force scale factors from the given ones, in σ.
   /// Largest deviation of a sensor's axes, in scale or from perpendicularity: in σ, and the size of the largest one.
   double axes_sigmas = 0.0, axes_differ = 0.0;
-  /// At the end of the path, in the IMU's axes.
+  /// Biases at the end of the path, in the IMU's axes.
   Eigen::Vector3d rate_bias = Eigen::Vector3d::Zero(), sigma_rate_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d force_bias = Eigen::Vector3d::Zero(), sigma_force_bias = Eigen::Vector3d::Zero();
   double late_s = 0.0, sigma_late_s = 0.0;          ///< IMU clock minus camera clock; corrected.

@@ -10,25 +10,25 @@
 
 namespace alidade {
 
-/// Two observed components of a position, their derivative by it, and their noise if it is there.
+/// Two observed components of a position, their derivative with respect to it, and their noise if given.
 struct PositionSeen {
   Eigen::Vector2d z;
   Eigen::Matrix<double, 2, 3> J_z_position;
   Eigen::Matrix2d R;
 };
 
-/// h(position), or none where it cannot be seen.
+/// h(position), or none if it is not in view.
 template <class See>
 concept SeesPosition = requires(const See& see, const Eigen::Vector3d& position) {
   { see(position) } -> std::same_as<std::optional<PositionSeen>>;
 };
 
 struct IteratedUpdateConfig {
-  int max_iterations = 4;   ///< Gauss–Newton steps.
-  double tolerance = 1e-3;  ///< Stop where the next step would move the measurement by less than this many σ.
+  int max_iterations = 4;   ///< Gauss–Newton steps, at most.
+  double tolerance = 1e-3;  ///< Stop when the next step would change the measurement by less than this many σ.
 };
 
-/// S⁻¹ of a symmetric 2×2, or NaN where it has none.
+/// S⁻¹ of a symmetric 2×2 matrix, or NaN if it is singular.
 [[nodiscard]] inline Eigen::Matrix2d inverse_of_symmetric(const Eigen::Matrix2d& S) {
   const double determinant = S(0, 0) * S(1, 1) - S(0, 1) * S(0, 1);
   const double scale = determinant > 0.0 ? 1.0 / determinant : std::nan("");
@@ -48,7 +48,7 @@ template <int N>
   return result;
 }
 
-/// P − K H P − (P − K H P) Hᵀ Kᵀ + K R Kᵀ, where H sees the position alone: Joseph's form with products of rank 2.
+/// P − K H P − (P − K H P) Hᵀ Kᵀ + K R Kᵀ, where H depends on the position only: Joseph's form with products of rank 2.
 /// G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, section II.5.
 template <int N>
 void joseph_update(Eigen::Matrix<double, N, N>& P, const Eigen::Matrix<double, N, 2>& K,
@@ -63,7 +63,7 @@ void joseph_update(Eigen::Matrix<double, N, N>& P, const Eigen::Matrix<double, N
 }
 
 /// Iterated extended Kalman update: x ← x̂ + K_j (z − h(x_j) − H_j (x̂ − x_j)), the covariance by Joseph's form at the
-/// last H and R. `expected` is see(x̂). None where an iterate cannot be seen or nothing finite comes out; use the prior
+/// last H and R. `expected` is see(x̂). None if an iterate is not in view or the result is not finite; keep the prior
 /// then. Bell & Cathey, "The iterated Kalman filter update as a Gauss–Newton method", 1993.
 template <int N, SeesPosition See>
 [[nodiscard]] std::optional<Belief<N>> iterated_update(const Belief<N>& prior, const PositionSeen& expected,

@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// The median, the upper one for an even number; 0 of none.
+/// The median; for an even number of values the upper one; 0 for none.
 template <typename Number>
 [[nodiscard]] Number median_of(std::vector<Number> values) {
   if (values.empty()) return Number{};

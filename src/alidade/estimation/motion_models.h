@@ -7,8 +7,8 @@
 
 namespace alidade {
 
-/// How a target moves between measurements: the belief dt ≥ 0 later. The first three components of every state are the
-/// position [m], the next three the velocity [m/s]; the frame is the caller's and does not rotate.
+/// Motion of a target between measurements: returns the belief a time dt ≥ 0 later. The first three components of every
+/// state are the position [m], the next three the velocity [m/s]; the frame is the caller's and does not rotate.
 template <class Model>
 concept MotionModel = requires(const Model& model, const Belief<Model::dim>& belief, double dt_s) {
   { Model::dim } -> std::convertible_to<int>;
@@ -18,8 +18,8 @@ concept MotionModel = requires(const Model& model, const Belief<Model::dim>& bel
   { model.predicted(belief, dt_s) } -> std::same_as<Belief<Model::dim>>;
 };
 
-/// σ_a is the acceleration that, held for this long and then drawn again, moves the target as white noise of density
-/// q = σ_a² · 0.05 s does.
+/// σ_a is defined as an acceleration that is constant for this long and then drawn anew: it moves the target as white
+/// noise of density q = σ_a² · 0.05 s does.
 inline constexpr double acceleration_hold_s = 0.05;
 
 /// Constant velocity: F = [I, Δ; 0, I], Q = q [Δ³/3, Δ²/2; Δ²/2, Δ].
@@ -35,11 +35,11 @@ struct ConstantVelocity {
   [[nodiscard]] Belief<6> predicted(const Belief<6>& belief, double dt_s) const;
 };
 
-/// Free fall: constant velocity, and beside its noise the acceleration of gravity, known in the caller's frame.
+/// Free fall: constant velocity with its noise, and the acceleration of gravity, known in the caller's frame.
 struct Ballistic {
   static constexpr int dim = 6;
-  double sigma_a_m_s2 = 1.0;                           ///< Of what is not gravity: drag, above all.
-  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< Where y is down.
+  double sigma_a_m_s2 = 1.0;                           ///< σ of accelerations other than gravity, above all drag.
+  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< For a frame with y down.
 
   [[nodiscard]] Eigen::Vector<double, 6> transition(const Eigen::Vector<double, 6>& x, double dt_s) const;
   [[nodiscard]] Eigen::Matrix<double, 6, 6> transition_jacobian(const Eigen::Vector<double, 6>& x, double dt_s) const;
@@ -47,7 +47,7 @@ struct Ballistic {
   [[nodiscard]] Belief<6> predicted(const Belief<6>& belief, double dt_s) const;
 };
 
-/// Velocity that returns to rest: dv = −v/τ dt + noise that holds its σ at σ_v. (Ornstein–Uhlenbeck.)
+/// Velocity that returns to zero: dv = −v/τ dt + noise that keeps its σ at σ_v (Ornstein–Uhlenbeck process).
 struct MeanReverting {
   static constexpr int dim = 6;
   double sigma_v_m_s = 0.9;
@@ -59,8 +59,8 @@ struct MeanReverting {
   [[nodiscard]] Belief<6> predicted(const Belief<6>& belief, double dt_s) const;
 };
 
-/// Acceleration that returns to zero: da = −a/τ dt + noise that holds its σ at σ_a. State [p, v, a].
-/// R. A. Singer, "Estimating optimal tracking filter performance for manned maneuvering targets", 1970.
+/// Acceleration that returns to zero: da = −a/τ dt + noise that keeps its σ at σ_a. State [p, v, a]. R. A. Singer,
+/// "Estimating optimal tracking filter performance for manned maneuvering targets", 1970.
 struct Singer {
   static constexpr int dim = 9;
   double sigma_a_m_s2 = 1.0;
@@ -76,8 +76,8 @@ struct Singer {
 /// Bar-Shalom, Li & Kirubarajan, 2001, section 11.7, in three dimensions.
 struct CoordinatedTurn {
   static constexpr int dim = 9;
-  double sigma_a_m_s2 = 0.3;                 ///< Of what is no turn; 0.3 of what constant velocity would need.
-  double turn_density_rad_s_per_rt_s = 2.0;  ///< ω drifts by this in a second.
+  double sigma_a_m_s2 = 0.3;                 ///< σ of accelerations other than the turn; 0.3 of constant velocity's.
+  double turn_density_rad_s_per_rt_s = 2.0;  ///< Random walk of ω: its σ after one second.
 
   [[nodiscard]] Eigen::Vector<double, 9> transition(const Eigen::Vector<double, 9>& x, double dt_s) const;
   [[nodiscard]] Eigen::Matrix<double, 9, 9> transition_jacobian(const Eigen::Vector<double, 9>& x, double dt_s) const;

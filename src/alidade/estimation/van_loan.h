@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// exp(A) by scaling, the Taylor series and squaring; exact to rounding for the small matrices of motion models.
+/// exp(A) by scaling, Taylor series and squaring; exact to rounding for the small matrices of motion models.
 template <int N>
 [[nodiscard]] Eigen::Matrix<double, N, N> matrix_exponential(const Eigen::Matrix<double, N, N>& A) {
   const double size = A.cwiseAbs().rowwise().sum().maxCoeff();
@@ -25,8 +25,8 @@ struct Discretised {
   Eigen::Matrix<double, N, N> F, Q;
 };
 
-/// F and Q over dt of dx = A x dt + noise of density D: from the exponential of [−A, D; 0, Aᵀ] dt.
-/// C. F. Van Loan, "Computing integrals involving the matrix exponential", 1978.
+/// F and Q over dt for dx = A x dt + noise of density D: from the exponential of [−A, D; 0, Aᵀ] dt. C. F. Van Loan,
+/// "Computing integrals involving the matrix exponential", 1978.
 template <int N>
 [[nodiscard]] Discretised<N> discretised(const Eigen::Matrix<double, N, N>& A, const Eigen::Matrix<double, N, N>& D,
                                          double dt_s) {

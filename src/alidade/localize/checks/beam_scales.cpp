@@ -14,11 +14,11 @@
 namespace alidade {
 namespace {
 
-/// Which surface a beam meets.
+/// Choice of the surface that a beam meets.
 enum class SurfaceBy {
-  nearest,  ///< Through the nearest points.
-  around,   ///< Any through points in one plane all around the beam: where one stands before another, which one do the
-            ///< readings say together.
+  nearest,  ///< The plane through the nearest points.
+  around,   ///< Any plane through coplanar points all around the beam; if there are several, one behind the other,
+            ///< the readings together decide.
 };
 
 std::vector<BeamSurface> surfaces_of(const Eigen::Vector3d& hit_in_cam, std::span<const Eigen::Vector3d> points_in_cam,
@@ -37,7 +37,7 @@ std::optional<BeamScale> scale_on(const BeamSurface& surface, const Beam& beam, 
   const double distance = surface.middle.norm();
   if (std::abs(of_hit) < grazing * hit_in_cam.norm() || surface.roughness > max_roughness * distance)
     return std::nullopt;
-  // n·X = c in units; where the beam hits it is s c in metres.
+  // n·X = c in units; n·X = s c in metres for the point where the beam hits it.
   const double scale = of_hit / to_plane;
   if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
   const Eigen::RowVectorXd of_params = surface.normal.transpose() * J_point_beam(beam, range_m) / to_plane;
@@ -45,8 +45,8 @@ std::optional<BeamScale> scale_on(const BeamSurface& surface, const Beam& beam, 
                    of_params.segment<2>(beam_direction_param).transpose()};
 }
 
-/// Metres a unit where the beam hits a plane through points near it, for each such plane, with what the reading's time
-/// does to it: the surface stays where it is.
+/// Metres per unit where the beam hits a plane through points near it, for each such plane, with its derivative with
+/// respect to the reading's time: the surface stays fixed.
 std::vector<BeamScale> scales_at(const RangeData& data, const RangeReading& reading, SurfaceBy by) {
   constexpr double step_s = 0.05;
   const auto pose = pose_at(data.path, reading.t_s);
@@ -78,10 +78,10 @@ std::optional<BeamScale> scale_at(const RangeData& data, const RangeReading& rea
   return scales.empty() ? std::nullopt : std::optional(scales.front());
 }
 
-/// Of the log of the scale by the beam's parameters: the median over the readings, since a moved beam may hit between
-/// other points.
+/// Derivative of ln scale with respect to the beam's parameters: median over the readings, since a displaced beam may
+/// hit between other points.
 BeamVector of_beam_params(const RangeData& data) {
-  constexpr double step = 1e-5;  // m, rad and shares alike
+  constexpr double step = 1e-5;  // m, rad or relative
   std::array<std::vector<double>, num_beam_params> slopes;
   for (const RangeReading& reading : data.readings) {
     const auto scale = scale_at(data, reading);
@@ -100,15 +100,15 @@ BeamVector of_beam_params(const RangeData& data) {
   return along;
 }
 
-/// Of each reading the scale that most of the others have, too: a kernel's mode. None where too few agree: the beam may
-/// have met none of these surfaces, as within a frame of points.
+/// For each reading the scale on which most of the others agree: the mode of a kernel density. Empty if too few agree:
+/// the beam may have met none of these surfaces, for instance inside a frame of points.
 std::optional<AgreeingScales> agreeing(std::span<const std::vector<BeamScale>> of_readings) {
   constexpr double width = 0.01, apart = 3.0, half = 0.5, enough = 0.6;
   const auto nearest = [](const std::vector<BeamScale>& scales, double log_scale) {
     return *std::ranges::min_element(scales, {},
                                      [&](const BeamScale& each) { return std::abs(each.log_scale - log_scale); });
   };
-  std::vector<std::pair<double, double>> supports;  // and scales
+  std::vector<std::pair<double, double>> supports;  // support and log scale
   for (const std::vector<BeamScale>& at : of_readings)
     for (const BeamScale& one : at) {
       double sum = 0.0;
@@ -127,7 +127,7 @@ std::optional<AgreeingScales> agreeing(std::span<const std::vector<BeamScale>> o
   return agreeing;
 }
 
-/// Of each reading that has a surface its scales, in order of time.
+/// The scales of each reading that has a surface, in order of time.
 std::vector<std::vector<BeamScale>> scales_by(SurfaceBy by, const RangeData& data) {
   std::vector<std::vector<BeamScale>> of_readings;
   for (const RangeReading& reading : data.readings) {

@@ -12,7 +12,7 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-/// The nearest to a direction, at most so many, as angles go.
+/// The points nearest in angle to a direction, at most `most` of them.
 Points near_direction(const Eigen::Vector3d& direction, std::span<const Eigen::Vector3d> points_in_cam,
                       std::size_t most) {
   constexpr double far_off = 0.25;
@@ -35,7 +35,7 @@ Points near_direction(const Eigen::Vector3d& direction, std::span<const Eigen::V
 
 constexpr std::size_t num_near = 6;
 
-/// Through the nearest of points, by least squares. They are off it as six would be.
+/// Least-squares plane through the nearest of the points. The roughness is corrected for the number of points.
 BeamSurface plane_through(Points points) {
   constexpr std::size_t of_plane = 3;
   points.resize(std::min(points.size(), num_near));
@@ -50,7 +50,7 @@ BeamSurface plane_through(Points points) {
   return plane;
 }
 
-/// Whether points are on all sides of a direction.
+/// Whether a direction is surrounded by points.
 bool surround(const Eigen::Vector3d& direction, const Points& points) {
   const Eigen::Vector3d x = direction.unitOrthogonal(), y = direction.cross(x);
   std::vector<double> angles;
@@ -61,7 +61,7 @@ bool surround(const Eigen::Vector3d& direction, const Points& points) {
   return widest < std::numbers::pi;
 }
 
-/// Those of the points that are in the plane through three of them with the most. `tolerance`: over the distance.
+/// The largest set of points coplanar with three of them. `tolerance`: relative to the distance.
 Points most_in_plane(const Points& points, double tolerance) {
   struct Plane {
     Eigen::Vector3d normal, in_plane;
@@ -86,8 +86,8 @@ Points most_in_plane(const Points& points, double tolerance) {
   return near;
 }
 
-/// Of a rough surface those in one plane, and those in as smooth a one as has three quarters as many: at an edge the
-/// others lie behind it. Where these are not all around the beam, the former.
+/// Points in one plane within a coarse tolerance, and those within a fine one if they are at least three quarters as
+/// many: at an edge the others lie behind it. If the latter do not surround the beam, the former.
 struct PlanePoints {
   Points rough, smooth;
 };
@@ -101,7 +101,7 @@ PlanePoints plane_points(const Eigen::Vector3d& direction, const Points& points)
     const auto shared = std::ranges::count_if(of_plane.smooth, [&](const Eigen::Vector3d& point) {
       return std::ranges::find(of_plane.rough, point) != of_plane.rough.end();
     });
-    const bool is_same = 4 * shared >= of_four * num;  // not what stands before it
+    const bool is_same = 4 * shared >= of_four * num;  // not a surface in front of it
     const bool has_most = is_same && 4 * num >= of_four * std::ssize(of_plane.rough);
     if (has_most && surround(direction, of_plane.smooth)) return of_plane;
   }
@@ -109,7 +109,7 @@ PlanePoints plane_points(const Eigen::Vector3d& direction, const Points& points)
   return of_plane;
 }
 
-/// Through the nearest of the smooth ones, as rough as the nearest of all: what is smooth may be curved.
+/// Plane through the nearest smooth points, with the roughness of the nearest of all: a smooth surface may be curved.
 BeamSurface surface_through(const PlanePoints& points) {
   const Points& rough = points.rough;
   BeamSurface surface = plane_through(points.smooth);

@@ -7,18 +7,18 @@
 
 namespace alidade {
 
-/// A plane through points that a beam passes between.
+/// A plane fitted to points around a beam.
 struct BeamSurface {
   Eigen::Vector3d normal, middle;
-  double roughness = 0.0;  ///< The points off it, RMS. [the points' unit]
+  double roughness = 0.0;  ///< RMS distance of the points from it. [the points' unit]
 };
 
-/// Through the points that are nearest to a direction. None: too few around it.
+/// Plane through the points nearest to a direction. Empty: too few points around it.
 [[nodiscard]] std::optional<BeamSurface> nearest_surface(const Eigen::Vector3d& direction,
                                                          std::span<const Eigen::Vector3d> points_in_cam);
 
-/// The surfaces that a beam may meet, each through the nearest of the most points near a direction that are in one
-/// plane and in none before, all around it: a board, and the wall behind it. In order of their numbers of points.
+/// All surfaces that a beam may meet, such as a board and the wall behind it. Each is fitted to the nearest points of
+/// the largest coplanar set near the direction that surrounds it, without earlier ones. Largest set first.
 [[nodiscard]] std::vector<BeamSurface> surfaces_around(const Eigen::Vector3d& direction,
                                                        std::span<const Eigen::Vector3d> points_in_cam);
 

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Down by the fit so far, and what of an arm lies along it; of nothing nothing.
+/// Downward direction and scale by the current fit; zero if there is none.
 struct Downwards {
   Eigen::Vector3d down = Eigen::Vector3d::Zero();
   double scale = 0.0;
@@ -26,7 +26,7 @@ double depth_of(const DepthRow& row, const DepthModel& model, const DepthFit& fi
   return model.has_arm() ? depth + by.down.dot(row.rotation * fit.arm_m) : depth;
 }
 
-/// A Gauss–Newton step, to the whole numbers: exact where there is no arm.
+/// One Gauss–Newton step, returning the full values, not increments: exact without an arm.
 std::optional<DepthFit> stepped(const DepthModel& model, const DepthFit& from, std::vector<DepthRow>& rows) {
   const int dim = model.dim();
   const Downwards by(from.g());
@@ -48,9 +48,9 @@ std::optional<DepthFit> stepped(const DepthModel& model, const DepthFit& from, s
     const double weight = row.weight * row.weight;
     b += weight * depth * J;
     for (int j = 0; j < dim; ++j)
-      for (int i = j; i < dim; ++i) H(i, j) += weight * J[j] * J[i];  // below the diagonal: LDLᵀ needs no more
+      for (int i = j; i < dim; ++i) H(i, j) += weight * J[j] * J[i];  // lower triangle only, for LDLᵀ
   }
-  // A path in a plane, or on a line, determines nothing of the direction across it: as good as none of it is downwards.
+  // A planar or straight path does not determine g across it: a weak prior sets that part to zero.
   constexpr double hardly = 1e-9;
   H.diagonal().head<3>().array() += hardly * H.diagonal().head<3>().sum();
   if (model.sigma_arm_m) {

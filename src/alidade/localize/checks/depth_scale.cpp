@@ -7,14 +7,14 @@
 #include "alidade/localize/checks/depth_fit.h"
 #include "alidade/localize/checks/scale_readings.h"
 
-// A depth sensor's scale: its clock, its filter, a jump or drift of its offset, and where it stands beside the camera.
+// A depth sensor's scale: its clock, its filter, a jump or drift of its offset, and its position in the camera frame.
 
 namespace alidade {
 namespace {
 
 constexpr double never_s = std::numeric_limits<double>::infinity();
 
-/// Mean square of what is left, in σ².
+/// Mean squared residual, in σ².
 double misfit_of(const DepthModel& model, std::vector<DepthRow> rows) {
   if (!fitted_without_far(model, rows)) return std::numeric_limits<double>::infinity();
   double squares = 0.0;
@@ -22,8 +22,8 @@ double misfit_of(const DepthModel& model, std::vector<DepthRow> rows) {
   return squares / static_cast<double>(rows.size());
 }
 
-/// How late the readings' clock is, where that explains clearly more than no offset: the least of a parabola through
-/// the best of a grid.
+/// Delay of the readings' clock, if it explains significantly more than none: the minimum of a parabola through the
+/// best of a grid.
 double clock_of(const DepthModel& model, const SensorPath& path) {
   constexpr double step_s = 0.05, clear = 12.0;  // of χ², 3.5σ
   constexpr int most = 20;
@@ -45,16 +45,16 @@ double clock_of(const DepthModel& model, const SensorPath& path) {
 /// Time constant and clock of a sensor.
 struct Follows {
   double tau_s = 0.0, late_s = 0.0, misfit = std::numeric_limits<double>::infinity();
-  double rival_tau_s = 0.0, rival_late_s = 0.0;  ///< A filter that is half believed.
+  double rival_tau_s = 0.0, rival_late_s = 0.0;  ///< A filter of doubtful significance.
 };
 
-/// A filter delays what it is shown by its time constant, as a late clock does, and makes it smaller, as no clock does:
-/// that with the least misfit, if it explains clearly more than the clock alone. Nothing is looked for where the clock
-/// is right and neighbours err by themselves.
+/// A low-pass filter delays its input by its time constant, as a late clock does, and attenuates it, as no clock does.
+/// Returns the one with the least misfit, if it explains significantly more than the clock alone. Skipped if the clock
+/// is right and residuals are not autocorrelated.
 Follows follows(const DepthModel& model, double late_s, const SensorPath& path) {
   constexpr double first_s = 0.05, last_s = 2.0, ratio = 1.1, step_s = 0.05, clear = 12.0, half_clear = 4.0,
                    alike = 3.0;
-  constexpr int most = 2;  // beside a filter, the clock is right
+  constexpr int most = 2;  // beside a filter, the clock is nearly right
   std::vector<DepthRow> rows = rows_at(model, late_s, path);
   const std::size_t num_given = rows.size();
   Follows best{.late_s = late_s, .misfit = misfit_of(model, rows)};
@@ -62,7 +62,7 @@ Follows follows(const DepthModel& model, double late_s, const SensorPath& path) 
   if (!fitted_without_far(model, rows) || (late_s == 0.0 && inflation(rows) < alike)) return clock;
   for (double tau_s = first_s; tau_s < last_s; tau_s *= ratio) {
     const SensorPath shown = path.filtered(tau_s);
-    if (2 * rows_at(model, 0.0, shown).size() < num_given) break;  // what is left of the readings fits anything
+    if (2 * rows_at(model, 0.0, shown).size() < num_given) break;  // so few readings would fit anything
     for (int k = -most; k <= most; ++k) {
       const double late = k * step_s;
       const double misfit = misfit_of(model, rows_at(model, late, shown));
@@ -80,10 +80,10 @@ Follows follows(const DepthModel& model, double late_s, const SensorPath& path) 
   return doubtful;
 }
 
-/// When the readings begin to have another offset, as where a sensor is set to zero or moved on its vehicle: where that
-/// explains clearly more than nothing, a clock or a filter (5.5σ at one of a hundred times), and leaves nothing that
-/// neighbours share, as a tide would. Without it the rest of the path goes up or down by the jump, and what is left
-/// looks like a filter. Nothing is looked for where neighbours err by themselves.
+/// Time from which readings have another offset, as when a sensor is zeroed or moved on its vehicle: if that explains
+/// significantly more than nothing, a clock or a filter (5.5σ at one of a hundred times), and leaves no
+/// autocorrelation, as a tide would. Without it the rest of the path would move vertically by the jump, and the
+/// residuals look like a filter. Skipped if residuals are not autocorrelated.
 double jump_of(const DepthModel& model, const SensorPath& path) {
   constexpr double clear = 30.0, alike = 3.0, few = 0.05;
   constexpr std::size_t ends = 5, most = 100;
@@ -116,7 +116,7 @@ double jump_of(const DepthModel& model, const SensorPath& path) {
   return is_worse(rows_at(model, other.late_s, shown)) ? 0.5 * (t_s[best - 1] + t_s[best]) : never_s;
 }
 
-/// What the readings are by one supposition of them.
+/// A hypothesis about the readings, and its fit.
 struct Account {
   DepthModel model;
   Follows found;
@@ -135,14 +135,14 @@ Account account_of(DepthModel model, const Follows& found, const SensorPath& pat
   return account;
 }
 
-/// With what of a jump, a clock and a filter the readings show by that model.
+/// The best jump, clock and filter for that model.
 Account searched(DepthModel model, const SensorPath& path) {
   model.jump_s = jump_of(model, path);
   const Follows found = follows(model, clock_of(model, path), path);
   return account_of(std::move(model), found, path);
 }
 
-/// Of χ², by which one explains the readings better than another.
+/// Decrease of χ² by one hypothesis relative to another.
 double gain(const Account& of, const Account& over) {
   if (!std::isfinite(of.cost.cost)) return 0.0;
   const DepthCost other = cost_of(over.model, over.rows, of.cost.limit);
@@ -156,16 +156,16 @@ DepthModel with_drift(DepthModel model, int num) {
 
 DepthModel with_arm(const DepthModel& model, const Follows& found, const SensorPath& path) {
   DepthModel with = model;
-  with.sigma_arm_m = 1.0;  // rows have the axes
+  with.sigma_arm_m = 1.0;  // so that the rows contain the axes
   const std::vector<DepthRow> rows = rows_by(with, found, path);
   return with_free_arm(std::move(with), rows);
 }
 
 constexpr double clear_gain = 30.0;
 
-/// One thing more that explains the readings clearly better, the best of them: the sensor stands elsewhere, or drifts.
-/// Only what does so with the clock and the filter as they are, or without, is looked at with others. A drift bends
-/// where that is clear as well.
+/// The best significant extension of a hypothesis: another position of the sensor, or a drift. Only extensions that
+/// improve the fit with the current clock and filter, or without these, are searched with others. A drift gets more
+/// pieces if that is significant as well.
 std::optional<Account> better(const Account& base, const SensorPath& path) {
   constexpr double worth_it = 12.0;
   const auto looked_at = [&](const DepthModel& model) -> std::optional<Account> {
@@ -195,15 +195,15 @@ std::optional<Account> better(const Account& base, const SensorPath& path) {
   return best;
 }
 
-/// ln of the scale by readings as they are in `rows`, far ones among them. None: no fit.
+/// ln of the scale from `rows`, which may contain outliers. Empty: no fit.
 std::optional<double> log_scale(const DepthModel& model, std::vector<DepthRow> rows) {
   const auto fit = fitted_without_far(model, rows);
   return fit && fit->g().norm() > 0.0 ? std::optional(std::log(fit->g().norm())) : std::nullopt;
 }
 
-/// What else the scale might be: by a filter, or an arm, that is half believed.
+/// Uncertainty of ln scale by a filter or an arm of doubtful significance.
 double doubt_of(const Account& account, double log, const SensorPath& path) {
-  constexpr double half_believed = 16.0;  // of three numbers one of a thousand
+  constexpr double half_believed = 16.0;  // p ≈ 0.001 for three parameters
   double doubt = 0.0;
   const auto add = [&](const std::optional<double>& other) {
     if (other) doubt = std::hypot(doubt, *other - log);
@@ -217,7 +217,7 @@ double doubt_of(const Account& account, double log, const SensorPath& path) {
   return doubt;
 }
 
-/// By how much ln of the scale changes where an arm of which no σ is given is 1 cm off.
+/// Change of ln scale if an arm without given σ is 1 cm off.
 double arm_effect(const Account& account, double log, const SensorPath& path) {
   constexpr double ordinary_m = 0.01;
   if (account.model.sigma_arm_m) return 0.0;
@@ -232,7 +232,7 @@ double arm_effect(const Account& account, double log, const SensorPath& path) {
   return std::sqrt(squares);
 }
 
-/// What was found beside the scale.
+/// Copies the other estimated effects.
 void take_found(const Account& account, const DepthFit& fit, double worse, ReadScale& read) {
   const DepthModel& model = account.model;
   read.late_s = account.found.late_s;
@@ -267,7 +267,7 @@ std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, 
   take_found(account, *fit, worse, read);
   const Eigen::Vector3d along = g / read.scale;
   const double variance = along.dot(cov * along), across = cov.trace() - variance, log = std::log(read.scale);
-  // |g| grows by what is not known across it.
+  // |g| is biased upwards by the variance across it.
   read.sigma_rel = std::hypot(std::sqrt(variance) / read.scale, 0.5 * across / (read.scale * read.scale), sigma_rel);
   read.sigma_rel = std::hypot(read.sigma_rel, doubt_of(account, log, path));
   read.noise_factor = std::sqrt(squares / free);

@@ -11,20 +11,20 @@
 namespace alidade {
 namespace {
 
-constexpr Eigen::Index num_frames = 16, order = 5;  ///< Of a window, and of the polynomials in it.
-constexpr int longest = 8;                          ///< Frames of a pattern.
+constexpr Eigen::Index num_frames = 16, order = 5;  ///< Frames of a window, order of its polynomials.
+constexpr int longest = 8;                          ///< Frames in a pattern.
 
 /// One component of the poses of a window.
 struct WindowPart {
   const NumberedPose* first = nullptr;
-  Eigen::Matrix<double, num_frames, order + 1> Q;  ///< Of the polynomials, orthonormal.
-  Eigen::Vector<double, num_frames> speed, left;   ///< By a period, and what polynomials do not explain.
-  double variance = 0.0;                           ///< Of what is left.
+  Eigen::Matrix<double, num_frames, order + 1> Q;  ///< Orthonormal basis of the polynomials.
+  Eigen::Vector<double, num_frames> speed, left;   ///< Per period; residual of the polynomials.
+  double variance = 0.0;                           ///< Of the residual.
 };
 
-/// Both windows that overlap by half and their six components count as independent: what they share is in the scatter.
+/// Overlapping windows and the six components count as independent: their correlation is in the scatter.
 void add_window(std::span<const NumberedPose> poses, std::vector<WindowPart>& parts) {
-  constexpr double nothing = 1e-24;  // variance of a path without errors
+  constexpr double nothing = 1e-24;  // variance of an error-free path
   const Rigid3 middle_from_world = poses[poses.size() / 2].world_from_cam.inverse();
   const double begin = poses.front().t_periods, half = 0.5 * (poses.back().t_periods - begin);
   if (!(half > 0.0)) return;
@@ -53,9 +53,9 @@ void add_window(std::span<const NumberedPose> poses, std::vector<WindowPart>& pa
   }
 }
 
-/// Score of the phases' delays, whose sum is zero: in an orthonormal basis of those.
+/// Score of the phases' delays, which sum to zero, in an orthonormal basis.
 struct PhaseScore {
-  Eigen::MatrixXd basis;  ///< Delays of the phases by their coordinates.
+  Eigen::MatrixXd basis;  ///< Delays of the phases from their coordinates.
   Eigen::VectorXd score;
   Eigen::MatrixXd information;
 };
@@ -80,7 +80,7 @@ PhaseScore phase_score(std::span<const WindowPart> parts, int size) {
   sum.information.diagonal().array() += hardly * sum.information.trace() + hardly;
   const Eigen::MatrixXd cov = Ldlt(sum.information).inverse();
   const Eigen::VectorXd delays = cov * sum.score;
-  double scatter = 0.0;  // mean of the scores' variance over the information
+  double scatter = 0.0;  // variance of the scores over the information, mean
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const Eigen::VectorXd left = scores[i] - informations[i] * delays;
     scatter += left.dot(cov * left) / static_cast<double>(num);
@@ -90,7 +90,7 @@ PhaseScore phase_score(std::span<const WindowPart> parts, int size) {
   return sum;
 }
 
-/// By how much frames are later than even steps of the same mean have them, in that mean.
+/// Delays of frames relative to equal steps with the same mean, in units of that mean.
 Eigen::VectorXd delays_of(std::span<const int> steps) {
   const auto num = static_cast<Eigen::Index>(steps.size());
   const double mean = std::accumulate(steps.begin(), steps.end(), 0.0) / static_cast<double>(num);
@@ -103,7 +103,7 @@ Eigen::VectorXd delays_of(std::span<const int> steps) {
   return delays.array() - delays.mean();
 }
 
-/// Of steps of which one is a period, and that are no shorter pattern again and again.
+/// Whether the shortest step is one period, and the steps do not repeat a shorter pattern.
 bool is_pattern(std::span<const int> steps) {
   if (std::ranges::min(steps) != 1) return false;
   for (std::size_t period = 1; period < steps.size(); ++period)
@@ -112,7 +112,7 @@ bool is_pattern(std::span<const int> steps) {
   return true;
 }
 
-/// The next of all combinations of steps; false after the last.
+/// Advances to the next combination of steps; false after the last.
 bool count_up(std::vector<int>& steps, int most) {
   for (int& step : steps) {
     if (++step <= most) return true;
@@ -123,13 +123,13 @@ bool count_up(std::vector<int>& steps, int most) {
 
 struct FoundPattern {
   std::vector<int> steps;
-  double gain = 0.0;  ///< Of twice a log likelihood, without what so many numbers explain of anything.
+  double gain = 0.0;  ///< Twice the log likelihood ratio, with a penalty per parameter.
 };
 
-/// Of long patterns one with few missing frames: a walk that repeats in as many frames looks like most of them missing.
+/// Long patterns need few missing frames: a walk with that period looks as if most frames were missing.
 void try_patterns(const PhaseScore& score, int size, FoundPattern& best) {
   constexpr int most = 3, short_size = 4, few_missing = 2;
-  constexpr double least_share = 0.2, most_share = 1.6;  // of the delays; a path's smoothing leaves less of them
+  constexpr double least_share = 0.2, most_share = 1.6;  // of the delays; smoothing of the path reduces them
   constexpr double of_number = 4.0, of_longer = 6.0, of_share = 0.25;
   std::vector<int> steps(static_cast<std::size_t>(size), 1);
   while (count_up(steps, most)) {

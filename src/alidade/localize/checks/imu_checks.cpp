@@ -6,7 +6,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/localize/checks/judge.h"
 
-// What is said of an IMU beside the camera.
+// Checks of an IMU beside the camera.
 
 namespace alidade {
 namespace {
@@ -99,7 +99,7 @@ std::string imu_fault_text(const ImuEstimate& imu) {
 
 namespace {
 
-/// Biases that walk more than they were said to, and a clock that runs fast.
+/// Bias walks that exceed the given density, and a clock that runs fast.
 void add_drifts(const ImuEstimate& imu, Verdict& verdict) {
   constexpr double any_clock_rate = 5e-4;
   const auto add = [&](const char* sensor, double factor, const Eigen::Vector3d& by, const char* unit) {
@@ -125,7 +125,7 @@ void add_drifts(const ImuEstimate& imu, Verdict& verdict) {
 }  // namespace
 
 bool clocks_differ(const Localization& report) {
-  constexpr double apart = 3.5, ordinary_s = 0.005;  // as stamps at the begin of an exposure are
+  constexpr double apart = 3.5, ordinary_s = 0.005;  // as for time stamps at the start of exposure
   const auto clock = std::ranges::find(report.given, "clock", &GivenNumber::name);
   if (!report.imu || clock == report.given.end() || clock->sigma == 0.0) return false;
   const double late = std::abs(report.imu->late_s),
@@ -133,7 +133,7 @@ bool clocks_differ(const Localization& report) {
   return late > ordinary_s && late > apart * sigma && late * clock->moves > 1.0;
 }
 
-/// Of readings that are used: what of them is not as given.
+/// Checks of readings that are used: deviations from what was given.
 void add_imu(const Localization& report, Verdict& verdict) {
   if (!report.imu || report.imu->fault != ImuFault::none) return;
   const ImuEstimate& imu = *report.imu;

@@ -4,59 +4,59 @@
 
 namespace alidade {
 
-/// What the path takes as given: the camera, and the target's scale.
+/// The assumptions of a path: the camera, and the scale of the target.
 [[nodiscard]] std::vector<Assumption> localize_assumed(const Localization& result);
 
-/// Where the times were made of a rate though the video has its own, another one by more than 1 %: so assumed. 0: none.
+/// Records an assumed frame rate, if the video has its own, different by more than 1 %. 0: it has none.
 void add_rate_assumed(double own_rate_hz, Localization& result);
 
-/// Whether the path stands. A path that its observations contradict is never good.
+/// Verdict on a path. A path that is contradicted by its observations is never good.
 [[nodiscard]] Verdict localize_verdict(const Localization& result);
 
-/// Whether the filter's poses of the frames in `recent` stand, before the path is solved as a whole: its path is theirs
+/// Verdict on the filter's poses of the frames in `recent`, before the path is solved as a whole: based on these
 /// alone.
 [[nodiscard]] Verdict live_verdict(const Localization& recent);
 
-/// Why an IMU's readings have no part in the path; empty where they have.
+/// Why an IMU's readings are not used for the path; empty if they are.
 [[nodiscard]] std::string imu_fault_text(const ImuEstimate& imu);
-/// Whether an IMU's clock and the frames' times are apart by more than is ordinary, and by more than moves a pose by σ:
+/// Whether the IMU's clock and the frames' times differ by more than is ordinary, and by more than moves a pose by σ:
 /// which of them is wrong is not known.
 [[nodiscard]] bool clocks_differ(const Localization& report);
-/// Checks of those that have.
+/// Adds checks of IMU readings that are used.
 void add_imu(const Localization& report, Verdict& verdict);
 
-/// What of a map that an earlier run has left is no longer so, or not known.
+/// Adds checks of the map of an earlier run: what has changed since, or is unknown.
 void add_map(const Localization& report, Verdict& verdict);
 
-/// The sensors that say how long the path is: "depth sensor, ± 0.2 %".
+/// The sensors that determine the scale of the path: "depth sensor, ± 0.2 %".
 [[nodiscard]] std::string sensors_text(const Localization& report);
-/// What sensors beside the camera say of a scale that is known without them, and two of them of each other.
+/// Compares the scales by other sensors with a scale that is known without them, and with each other.
 void add_sensors(const Localization& report, Verdict& verdict);
 
-/// Where σ has what of the focal length, or of the centre, the observations would not show.
+/// Reports where σ includes an undetectable error of the focal length or the centre.
 void add_hidden(const Localization& report, Verdict& verdict);
 
-/// Bad above `bad`, else care above `care`.
+/// State bad above `bad`, else care above `care`.
 [[nodiscard]] State state_of(double value, double care, double bad);
 
-/// |z| of what a score asks, with what anybody would believe of a lens: of one about which the observations know less
-/// than that, as those of a still camera, nothing is said.
+/// |z| of a score test, combined with a wide prior of lens parameters: if the observations determine one less than
+/// that, as those of a still camera, z is small.
 [[nodiscard]] double supported_z(const GivenNumber& given, const Camera& camera);
 
-/// By how many of its σ the path moves where something given is as the observations ask: of a target that does not
-/// stand still also by where it was half of the time before or after its mean, as the world is then anywhere between.
+/// Change of the path, in its σ, by the change that a score test indicates; for a moving target also its displacement
+/// in half of the time span, since the world frame is then uncertain by that.
 [[nodiscard]] double moved_sigmas(const GivenNumber& given, const Localization& result);
 
-/// Its score over that from which on it is doubted: above 1. Water of another index, and where pixels are found to be
-/// worse than usual another focal length, move the path by more of its σ than they show: there from a lower score on.
+/// Score over its limit: doubtful above 1. Water of another index, and (where pixel noise is found to be larger than
+/// usual) another focal length, move the path by more of its σ than their score shows: the limit is then lower.
 [[nodiscard]] double doubt_of(const GivenNumber& given, const Localization& report);
 
-/// What the observations ask of something given, with its size; where the path is solved with an IMU, together with its
-/// readings.
+/// The change of a given number that the observations indicate, with its size; with an IMU, observations and IMU
+/// readings together.
 [[nodiscard]] std::string cause_text(const GivenNumber& given, const Localization& result);
 
-/// Of a lens that the observations contradict, what of it is not as it was given: "focal length +2.1 % (12σ), centre u
-/// -3 px (8σ), k1 -0.02 (20σ)".
+/// For a lens that the observations contradict, its differences from the given one: "focal length +2.1 % (12σ), centre
+/// u -3 px (8σ), k1 -0.02 (20σ)".
 [[nodiscard]] std::string lens_changes(const Localization& result);
 
 }  // namespace alidade

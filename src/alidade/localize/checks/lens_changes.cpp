@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// "0.5 %", "3 px", "12 ms": what the observations ask for.
+/// "0.5 %", "3 px", "12 ms": the change that the observations indicate.
 std::string asked_text(const GivenNumber& given) {
   const double asked = given.asked;
   if (given.name == "focal length" || given.name == "shape of the target") return text_of(100.0 * asked, 2) + " %";
@@ -61,7 +61,7 @@ std::string cause_text(const GivenNumber& given, const Localization& report) {
 }
 
 double supported_z(const GivenNumber& given, const Camera& camera) {
-  constexpr double any_focal = 0.2, any_centre = 0.05, any_k1 = 0.3;  // as a path's lens is freed: path_lens.cpp
+  constexpr double any_focal = 0.2, any_centre = 0.05, any_k1 = 0.3;  // as when a path's lens is freed: path_lens.cpp
   double any = std::numeric_limits<double>::infinity();
   if (given.name == "focal length") any = any_focal;
   if (given.name.starts_with("centre")) any = any_centre * camera.width_px;
@@ -85,7 +85,7 @@ std::string lens_changes(const Localization& report) {
     const auto at = std::ranges::find(names, report.lens_params[i]) - names.begin();
     return std::abs(now[at] - given[at]) / report.sigma_lens[static_cast<Eigen::Index>(i)];
   };
-  double most = 0.0;  // where each may be for another, the one that is furthest off
+  double most = 0.0;  // if correlated changes are all small, the largest one
   for (std::size_t i = 0; i < report.lens_params.size(); ++i)
     if (report.lens_params[i] != "fy") most = std::max(most, by_sigma(i));
   std::string text;

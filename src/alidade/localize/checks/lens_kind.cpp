@@ -11,21 +11,21 @@
 #include "alidade/localize/observation_localizer.h"
 #include "alidade/localize/setup.h"
 
-// Whether the camera file is of another kind of lens. No parameter of a pinhole says that it is a fisheye, and a filter
-// that is wrong from its first frame on leaves no path whose scores would: the kinds are tried.
+// Whether the camera file has the wrong kind of lens. No pinhole parameter indicates a fisheye, and a filter that is
+// wrong from its first frame leaves no path for a score test: the kinds are tried.
 
 namespace alidade {
 namespace {
 
 constexpr std::array<std::string_view, 2> kinds{"brown", "kannala_brandt"};
-constexpr double well = 0.8;  ///< The share of the observations that a kind explains.
+constexpr double well = 0.8;  ///< Share of the observations that a kind of lens must explain.
 
-/// Observations against a path with its lens: squares over σ² up to the gate.
+/// Fit of observations to a path with its lens: squares over σ², capped at the gate.
 struct Explained {
   double cost = 0.0;
-  std::size_t num = 0, num_placed = 0, num_fit = 0;  ///< Placed: of a point of the map that is visible from there.
+  std::size_t num = 0, num_placed = 0, num_fit = 0;  ///< Placed: of a map point visible from there.
   double rms_px = 0.0;                               ///< Of those that fit, per point.
-  /// Of those placed that do not, in frame after frame, the cosine between the errors of a point in both.
+  /// Of placed misfits in consecutive frames: cosine between the two errors of a point.
   double sum_cosines = 0.0;
   std::size_t num_cosines = 0;
 
@@ -34,7 +34,7 @@ struct Explained {
   }
 };
 
-/// The errors of the last observations that did not fit, by their points.
+/// The error of the last misfit of each point.
 class Misfits {
  public:
   void add(std::size_t frame, long id, const Eigen::Vector2d& error_px, Explained& sums) {
@@ -79,7 +79,7 @@ Explained explained_by(const Localization& path, std::span<const ObservationFram
   return sums;
 }
 
-/// The config of a table whose lens is estimated, from these frames alone.
+/// Config for a table of observations with the lens estimated, using only these frames.
 LocalizeConfig with_free_lens(const Camera& camera, std::span<const KnownPoint> target, const LocalizeConfig& config) {
   LocalizeConfig out;
   out.new_points = config.new_points;
@@ -130,8 +130,8 @@ Camera without_cov(Camera camera, Lens lens) {
   return camera;
 }
 
-/// That kind of lens with the focal length and the centre of another, and no distortion: a fisheye whose angles are
-/// proportional to the distance from its centre.
+/// A lens of that kind with the focal length and centre of another, without distortion: for a fisheye, the angle is
+/// proportional to the distance from the centre.
 Camera as_kind(std::string_view kind, const Camera& camera) {
   const Lens plain = *make_lens(kind);
   Eigen::VectorXd values = Eigen::VectorXd::Zero(params(plain).size());
@@ -139,7 +139,7 @@ Camera as_kind(std::string_view kind, const Camera& camera) {
   return without_cov(camera, with_params(plain, values));
 }
 
-/// The lens of the kind of `given` that is nearest to another over the pixels of these frames, by Gauss–Newton.
+/// The lens of the kind of `given` that best approximates another at the pixels of these frames, by Gauss–Newton.
 Camera nearest_of_kind(const Camera& given, const Camera& other, std::span<const ObservationFrame> frames) {
   constexpr int max_steps = 20;
   constexpr std::size_t most = 2000;
@@ -170,8 +170,8 @@ Camera nearest_of_kind(const Camera& given, const Camera& other, std::span<const
   return camera;
 }
 
-/// Which of a frame's points are to be seen as well: of those that are seen longest from there on, from near the centre
-/// of the image to its edge, by which kinds of lens differ.
+/// Points of a frame to add: of those that are observed longest from there on, spread from the image centre to the
+/// edge, where kinds of lens differ.
 std::vector<long> points_to_add(const ObservationFrame& frame, const Eigen::Vector2d& centre_px, std::size_t num,
                                 const std::map<long, std::size_t>& num_left, const std::set<long>& chosen) {
   std::vector<std::pair<double, long>> by_radius;
@@ -188,11 +188,11 @@ std::vector<long> points_to_add(const ObservationFrame& frame, const Eigen::Vect
   return added;
 }
 
-/// The frames with the target's and at any time so many other points: a filter's work grows with the square of their
-/// number and more.
+/// The frames with the target's points and a limited number of others at any time: the work of a filter grows at least
+/// with the square of their number.
 std::vector<ObservationFrame> with_fewer_points(std::span<const ObservationFrame> frames,
                                                 std::span<const KnownPoint> target, const Camera& camera) {
-  // Without a target from 30 on none is tried with another speed (ObservationLocalizer::start).
+  // With 30 points or more and no target, no other speeds are tried (ObservationLocalizer::start).
   const std::size_t enough = target.empty() ? 40 : 20, few = target.empty() ? 30 : 15;
   const Eigen::Vector2d centre_px = params(camera.lens).segment<2>(2);
   std::map<long, std::size_t> num_left;
@@ -216,20 +216,20 @@ std::vector<ObservationFrame> with_fewer_points(std::span<const ObservationFrame
   return out;
 }
 
-/// Whether what a verdict is not content with may be due to the lens.
+/// Whether the deficiencies of a verdict may be due to the lens.
 bool may_be_of_lens(const Verdict& verdict) {
   if (verdict.state == State::not_converged || verdict.state == State::refused) return true;
   const std::set<std::string_view> of_lens{
       "innovations",      "frames lost",           "gated", "target",     "restarts", "camera",
       "radial structure", "position in the image", "σ",     "map's frame"};
-  // Innovations smaller than stated are no lens's doing.
+  // Innovations smaller than stated are not caused by a lens.
   return std::ranges::any_of(verdict.checks, [&](const Check& check) {
     return check.state != State::good && of_lens.contains(check.name) &&
            (check.name != "innovations" || check.value > check.limit);
   });
 }
 
-/// Whether a lens of the given kind is estimated that leaves no other anything to explain.
+/// Whether an estimated lens of the given kind leaves nothing for another kind to explain.
 bool is_explained(const Localization& result) {
   constexpr double noise_alone = 1.15;
   constexpr std::size_t few = 20;
@@ -237,19 +237,19 @@ bool is_explained(const Localization& result) {
          few * result.num_gated < result.num_used;
 }
 
-/// Whether so many observations are mismatches that no kind of lens explains enough: what a lens makes of a point is
-/// nearly the same in the next frame, and one mismatch has nothing in common with another.
+/// Whether there are so many mismatches that no kind of lens explains enough: the error of a point by a wrong lens is
+/// nearly the same in the next frame, whereas mismatches are unrelated to each other.
 bool has_many_mismatches(const Explained& explained) {
-  constexpr std::size_t enough = 200;  // a cosine's mean by chance: 0.05
+  constexpr std::size_t enough = 200;  // standard error of a mean cosine: 0.05
   if (explained.num_cosines < enough) return false;
   const double in_common = std::max(explained.sum_cosines / static_cast<double>(explained.num_cosines), 0.0);
   const auto num_misfits = static_cast<double>(explained.num_placed - explained.num_fit);
   return (1.0 - in_common) * num_misfits > (1.0 - well) * static_cast<double>(explained.num);
 }
 
-/// Whether the lens has no part in it: the path is of all that was seen (but for points that are in no map, as those of
-/// images that were hardly found again), and nothing is left that depends on where in the image it was, as another kind
-/// of lens leaves it.
+/// Whether the lens is not the cause: the path uses all that was seen (except points that are in no map, such as points
+/// of images that were hardly found again), and no residual depends on the position in the image, as it would with
+/// another kind of lens.
 bool leaves_no_trace(const Localization& result, const Explained& explained) {
   constexpr double nearly_all = 0.99;
   const std::set<std::string_view> traces{"camera", "radial structure", "position in the image"};
@@ -301,7 +301,7 @@ std::optional<OtherLensKind> other_lens_kind(std::span<const ObservationFrame> f
   const auto is_better = [](const Explained& a, const Explained& b) {
     return a.cost < far_better * b.cost && a.cost + least_gain < b.cost;
   };
-  // The other kinds first: where none explains enough, the given one need not be solved again.
+  // The other kinds first: if none explains enough, there is no need to solve with the given one again.
   std::vector<Solved> others;
   for (const std::string_view kind : kinds)
     if (kind != given_kind) others.push_back(solved(as_kind(kind, given)));
@@ -323,7 +323,7 @@ void add_lens_kind(const OtherLensKind& other, Localization& result) {
   Verdict& verdict = result.verdict;
   const std::string text = text_about(other, result.camera.lens);
   verdict.checks.push_back({"lens", State::bad, text, other.explained_by_given, other.explained, "1", "path"});
-  if (verdict.state < State::bad) {  // the sentence has what is of the worst state
+  if (verdict.state < State::bad) {  // the sentence names only what is in the worst state
     verdict.state = State::bad;
     verdict.sentence = verdict.sentence.substr(0, verdict.sentence.find(';'));
   }

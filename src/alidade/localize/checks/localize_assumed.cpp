@@ -32,7 +32,7 @@ constexpr std::array<Named, 9> all_named{{{"focal length", "camera.f (relative)"
                                           {"port's normal x", "camera.normal_x", ordinary_normal},
                                           {"port's normal y", "camera.normal_y", ordinary_normal}}};
 
-/// Parameters of the lens by the names of what is given.
+/// Lens parameters by the names of given numbers.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 6> lens_names{{{"centre u", "cx"},
                                                                                    {"centre v", "cy"},
                                                                                    {"water's index", "n_water"},
@@ -50,7 +50,7 @@ double value_of(std::string_view given, const Camera& camera) {
   return lens[std::ranges::find(names, named->second) - names.begin()];
 }
 
-/// Where a depth sensor that gives the scale is.
+/// Position of a depth sensor that determines the scale.
 void add_depth_arm(const Localization& report, std::vector<Assumption>& assumed) {
   constexpr double ordinary_m = 0.01;
   double weights = 0.0;
@@ -68,8 +68,8 @@ void add_depth_arm(const Localization& report, std::vector<Assumption>& assumed)
   }
 }
 
-/// A mirrored image is the image of a mirrored world: known points have a left and a right, and turns that something
-/// else measures.
+/// Mirrored images look like those of a mirrored world. Handedness is determined only by known points, or by rotations
+/// measured with another sensor.
 bool has_handedness(const Localization& report) {
   const bool is_turned =
       std::ranges::any_of(report.sensor_scales, [](const SensorScale& each) { return each.sensor == "odometry"; });

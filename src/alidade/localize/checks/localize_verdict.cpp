@@ -20,7 +20,7 @@ Verdict stopped(State state, ExitCode code, std::string sentence, std::string to
   return {state, code, std::move(sentence), std::move(to_add), {}};
 }
 
-/// Why there is no path at all.
+/// Reason why there is no path at all.
 Verdict never_started(const Localization& report) {
   const auto undetermined = [](std::string sentence, std::string to_add) {
     return stopped(State::refused, ExitCode::undetermined, std::move(sentence), std::move(to_add));
@@ -43,8 +43,8 @@ Verdict never_started(const Localization& report) {
                       "begin in front of the target, or give --start");
 }
 
-/// What only the truth shows: a path may fit its own map well and be elsewhere. An alignment only takes errors away, so
-/// what is left after it should be within σ; before it the truth may stand in a frame of its own.
+/// Errors that only ground truth reveals: a path may fit its own map well and be wrong. An alignment only reduces
+/// errors, so the rest should be within σ; without it, the truth may be in another frame.
 void add_truth(const Localization& report, Verdict& verdict) {
   const PathError& error = report.error;
   if (!std::isfinite(error.ate_m) || !(error.stated_m > 0.0)) return;
@@ -54,7 +54,7 @@ void add_truth(const Localization& report, Verdict& verdict) {
       {"truth", state_of(ratio, care_ratio, bad_ratio),
        "the path is " + text_of(ratio, 2) + " times its σ from the truth, after the best alignment", ratio, care_ratio,
        "σ", "path"});
-  if (!report.has_target) return;  // the world is the first camera's: no truth stands in it
+  if (!report.has_target) return;  // the frame is that of the first camera, not that of the truth
   const double before = error.unaligned_m / error.stated_m;
   if (report.scale_known && before > elsewhere_ratio)
     verdict.checks.push_back({"truth's frame", State::care,
@@ -64,7 +64,7 @@ void add_truth(const Localization& report, Verdict& verdict) {
                               before, elsewhere_ratio, "σ", "path"});
 }
 
-/// Reinitialised again and again without being lost.
+/// Whether the filter was reinitialised repeatedly without being lost.
 bool begins_often(const Localization& report) {
   std::size_t num_again = 0;
   for (std::size_t i = 1; i < report.path.size(); ++i)
@@ -74,24 +74,24 @@ bool begins_often(const Localization& report) {
   return num_again >= few && share(num_again, report.path.size()) >= often;
 }
 
-/// Whether the smoothed path explains what was seen before the filter was reinitialised, too. Matches of images were
-/// looked for where the filter expected them: that they fit shows that it was right where the points that are seen on
-/// both sides are the same.
+/// Whether the smoothed path also explains the observations before a restart of the filter. Matches of images were
+/// searched for where the filter predicted them: their fit shows that it was right only if the same points are seen on
+/// both sides.
 bool is_solved_again(const Localization& report) {
   constexpr double few = 0.01;
   if (!report.is_smoothed || !(share(report.num_unexplained, report.path.size()) < few)) return false;
   return !report.is_of_images || (report.num_untied == 0 && !begins_often(report));
 }
 
-/// Often: no path explains what this camera saw of this target.
+/// Bad if restarts are frequent: no path explains what this camera saw of this target.
 State restarts_state(const Localization& report) {
   if (is_solved_again(report)) return State::good;
-  // Mismatches in a table may look like another pose for a frame.
+  // Mismatches in a table may look like another pose for one frame.
   if (!report.is_of_images && (report.is_smoothed || !(report.nis_per_dof > good_nis_high))) return State::care;
   return begins_often(report) ? State::bad : State::care;
 }
 
-/// After frames without a pose it is the way back; else what led to it was wrong for some time before.
+/// A restart after frames without a pose is a recovery; otherwise the path was wrong for some time before it.
 std::string restarts_text(const Localization& report) {
   std::size_t num_back = 0, num_again = 0;
   long last_again = 0;
@@ -114,8 +114,8 @@ std::string restarts_text(const Localization& report) {
   return text;
 }
 
-/// Of what was given, the one of which the observations ask most: a wrong lens moves the others' scores, too. From one
-/// place the target looks as much shorter as it is tilted, which is not linear: nothing is said of its shape.
+/// Reports only the given number with the largest score over its limit: a wrong lens changes the other scores, too.
+/// From one place, tilt and another shape of the target look alike, nonlinearly: the shape is not tested.
 void add_given(const Localization& report, Verdict& verdict) {
   const GivenNumber* worst = nullptr;
   for (const GivenNumber& given : report.given) {
@@ -147,12 +147,12 @@ void add_given(const Localization& report, Verdict& verdict) {
                               report.lens_pull, care_pull, "σ", "path"});
 }
 
-/// What a wrong lens leaves of observations after the update: the same along the radius in every frame. Depths that are
-/// not known leave it as well while the camera moves along its axis: it is judged where known points are seen.
+/// Residuals by a wrong lens after the update: the same along the radius in every frame. Unknown depths cause them as
+/// well while the camera moves along its axis: tested only if known points are seen.
 void add_radial(const Localization& report, Verdict& verdict) {
-  constexpr double chance = 12.0;  // squares of the rings' means over their σ², their mean
+  constexpr double chance = 12.0;  // mean of squares of the rings' means over their σ²
   constexpr double care_share = 0.12, bad_share = 0.4;
-  constexpr double min_px = 0.05;  // patches that change as they are seen from elsewhere leave less
+  constexpr double min_px = 0.05;  // the changing appearance of patches causes less
   const RadialStructure& radial = report.radial;
   const bool is_more = report.has_target && report.scale_known && radial.chi2_per_ring > chance &&
                        radial.share * report.sigma_px > min_px;
@@ -167,11 +167,11 @@ void add_radial(const Localization& report, Verdict& verdict) {
                             radial.share, care_share, "σ", "nis"});
 }
 
-/// Residuals that are said to be independent: by position in the image, and from frame to frame.
+/// Residuals should be independent: of the position in the image, and from frame to frame.
 void add_residuals(const Localization& report, Verdict& verdict) {
   if (!report.is_smoothed) return;
   const ResidualStructure& residuals = report.residuals;
-  constexpr double care_px_share = 0.2;  // of σ: less is seen in long recordings and moves nothing
+  constexpr double care_px_share = 0.2;  // of σ: smaller ones are significant in long recordings, but harmless
   if (residuals.mean_chi2 > 2.0 * residuals.mean_chi2_limit && residuals.worst_px > care_px_share * report.sigma_px)
     verdict.checks.push_back({"position in the image", State::care,
                               "residuals depend on the position in the image, " + text_of(residuals.worst_px, 2) +
@@ -184,7 +184,7 @@ void add_residuals(const Localization& report, Verdict& verdict) {
                               residuals.autocorrelation, 0.25, "1", "nis"});
 }
 
-/// A filter over hundreds of frames is surer than it may be.
+/// A filter over hundreds of frames is overconfident.
 void add_filter_alone(const Localization& report, Verdict& verdict) {
   constexpr std::size_t few = 100;
   if (report.is_of_images || report.is_smoothed || report.path.size() < few) return;
@@ -218,9 +218,9 @@ void add_side(const Localization& report, Verdict& verdict) {
       "check that x goes right and y down as the target is seen; if +z is its front, say 'seen_from: +z' in --target";
 }
 
-/// In images innovations say little of σ: a patch is looked for as it was seen first, its error lasts from image to
-/// image, and is no innovation. Of films whose NIS is 0.13 to 0.37 the path is 0.6 to 3.4 times its σ off; with σ of a
-/// match as the innovations have it, up to 4.7 times.
+/// In images, innovations say little about σ: a patch is searched for as it looked first, so its error persists from
+/// image to image and does not appear as an innovation. In videos with NIS 0.13 to 0.37 the error of the path is 0.6 to
+/// 3.4 times its σ; with σ of a match from the innovations, up to 4.7 times.
 void add_innovations(const Localization& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
   constexpr double lasting_low = 0.1;
@@ -240,7 +240,7 @@ void add_innovations(const Localization& report, Verdict& verdict) {
                             good_nis_high, "1", "nis"});
 }
 
-/// Frames without a pose, and observations that were not believed.
+/// Frames without a pose, and rejected observations.
 void add_losses(const Localization& report, Verdict& verdict) {
   const double lost = lost_share(report);
   verdict.checks.push_back({"frames lost", state_of(lost, 0.0, care_lost),
@@ -258,7 +258,7 @@ void add_losses(const Localization& report, Verdict& verdict) {
                             text_of(100.0 * gated, 3) + " % of the observations are rejected", gated, bad_gated, "1",
                             "tracks"});
   if (report.num_known == 0) return;
-  // Known points may be mismatched as often as others; if more often, they are not where they are said to be.
+  // Known points are mismatched as often as others; if more often, their given positions are wrong.
   const double known_gated = share(report.num_known_gated, report.num_known);
   verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
                             text_of(100.0 * known_gated, 3) + " % of the target's observations are rejected",
@@ -274,7 +274,7 @@ std::string scale_text(const Localization& report) {
   return "scale unknown: the path is up to scale, its unit is the depth at the start";
 }
 
-/// Where the map stands, and how large it is.
+/// Frame and scale of the map.
 void add_frame(const Localization& report, Verdict& verdict) {
   constexpr double max_shift = 3.0;  // χ² of a rectangle's twelve components over their count: 99.9 % is 2.7
   if (report.known_shift > max_shift)
@@ -287,7 +287,7 @@ void add_frame(const Localization& report, Verdict& verdict) {
       {"scale", report.scale_known ? State::good : State::care, scale_text(report), 0.0, 0.0, "", "path"});
 }
 
-/// What of the images was not looked at.
+/// Parts of the images that were masked.
 void add_masks(const Localization& report, Verdict& verdict) {
   if (report.lacks_circle)
     verdict.checks.push_back(
@@ -305,7 +305,7 @@ void add_restarts(const Localization& report, Verdict& verdict) {
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});
 }
 
-/// Of a path, in the order in which its report has them.
+/// Adds all checks of a path, in the order of the report.
 void add_checks(const Localization& report, Verdict& verdict) {
   for (const auto add :
        {add_innovations, add_losses, add_missing, add_frame, add_map, add_masks, add_restarts, add_sensors, add_imu,
@@ -313,7 +313,7 @@ void add_checks(const Localization& report, Verdict& verdict) {
     add(report, verdict);
 }
 
-/// Why what came of the frames is no path.
+/// Reason why the result is not a path; empty if it is.
 std::optional<Verdict> refusal(const Localization& report) {
   if (std::ranges::none_of(report.path, &PathStep::has_pose)) return never_started(report);
   if (report.num_used == 0 || report.max_seen < 3)
@@ -348,7 +348,7 @@ std::optional<Verdict> refusal(const Localization& report) {
   return std::nullopt;
 }
 
-/// State and sentence by the checks.
+/// State and sentence from the checks.
 void conclude(const Localization& report, Verdict& verdict) {
   for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);
   const std::size_t num_frames = report.path.size();
@@ -360,8 +360,8 @@ void conclude(const Localization& report, Verdict& verdict) {
   }
 }
 
-/// A filter's linearisation of points that enter leaves what another lens would: it is judged where the target is in
-/// sight in four frames of five.
+/// A filter's linearisation of new points looks like another lens: the lens is tested only if the target is visible in
+/// four of five frames.
 bool shows_target(const Localization& recent) {
   constexpr std::size_t least_known = 4;
   const auto num = std::ranges::count_if(

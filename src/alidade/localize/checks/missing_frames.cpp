@@ -12,21 +12,21 @@
 namespace alidade {
 namespace {
 
-/// Of poses around a step: how many, and of which order a polynomial of time they are.
+/// Neighbourhood of a step: number of frames, and order of the polynomial of time that models the poses.
 struct Reach {
   std::size_t aside = 0;  ///< Frames on each side.
   Eigen::Index frames_a_power = 6;
-  bool has_bend = false;  ///< At the step its second and third derivative may jump, as where a camera sets off.
+  bool has_bend = false;  ///< The second and third derivative may jump at the step, as when a camera starts to move.
   [[nodiscard]] Eigen::Index order(Eigen::Index num_frames) const {
     return std::max<Eigen::Index>(1, (num_frames + 3) / frames_a_power);
   }
 };
-/// Of many a walk is none; of few no wave of it is whole.
+/// A walk is not polynomial over many frames; few frames do not contain one of its periods.
 constexpr Reach few{5, 6, false}, some{8, 4, true}, many{16, 6, true};
 constexpr std::size_t least_aside = 3;
 constexpr int most_missing = 30;
 
-/// A longer step, and twice the gain of log likelihood by it.
+/// A longer step, and twice its log likelihood ratio.
 struct LongerStep {
   int num = 0;
   double gain = 0.0;
@@ -68,10 +68,10 @@ class PathTimes {
   [[nodiscard]] const std::vector<int>& pattern() const { return pattern_; }
 
  private:
-  static constexpr double nothing = 1e-24;  ///< Variance of a path without errors.
-  static constexpr double sure = 45.0;      ///< Of twice a log likelihood: the path's errors last for some frames.
+  static constexpr double nothing = 1e-24;  ///< Variance of an error-free path.
+  static constexpr double sure = 45.0;      ///< Twice the log likelihood ratio; high, as path errors are correlated.
 
-  /// Where frames come by any clock of their own, their times say themselves what is missing.
+  /// If frames have no constant period, their times are taken as true.
   [[nodiscard]] bool has_period() {
     if (steps_.size() < 2 * few.aside) return false;
     std::vector<double> gaps_s;
@@ -85,7 +85,7 @@ class PathTimes {
     return static_cast<std::size_t>(20 * num_even) >= 19 * gaps_s.size();
   }
 
-  /// Of every few frames one or some missing: around each of them others are, and none explains much alone.
+  /// Tries a regular pattern: around each missing frame others are missing, and none explains much alone.
   void suppose_pattern() {
     std::vector<NumberedPose> poses;
     for (std::size_t i = 0; i < steps_.size(); ++i)
@@ -95,8 +95,8 @@ class PathTimes {
     for (std::size_t i = 1; i < steps_.size(); ++i) missing_[i] = pattern_[(index_[i] - 1) % pattern_.size()] - 1;
   }
 
-  /// Whether poses are polynomials of the times that were found, as far as what is new from frame to frame lets them
-  /// be: a step explains little of a motion that is none, as of whoever walks, and that at random.
+  /// Whether poses are polynomials of the corrected times, as far as frame-to-frame noise allows: for a motion that is
+  /// not, such as walking, a longer step explains little, and that by chance.
   [[nodiscard]] bool is_smooth() const {
     constexpr double rough = 25.0, less = 0.7;
     std::array<std::vector<double>, 6> news;
@@ -110,7 +110,7 @@ class PathTimes {
     return found < rough || found < less * roughness(std::vector<int>(steps_.size(), 0), noise);
   }
 
-  /// Variance about the polynomials over the noise, of most components in most places.
+  /// Variance about the polynomials over the noise: mean over components (log), median over places.
   [[nodiscard]] double roughness(const std::vector<int>& missing, const Eigen::Array<double, 6, 1>& noise) const {
     std::vector<double> ratios;
     for (std::size_t from = 0; from + 2 * few.aside <= steps_.size(); from += some.aside) {
@@ -120,7 +120,7 @@ class PathTimes {
     return std::exp(median_of(std::move(ratios)));
   }
 
-  /// Variance of one pose by third differences, as those are where no frame is missing: their lower quarter.
+  /// Variance of one pose from third differences, of their lower quartile, where no frame is missing.
   [[nodiscard]] static double noise_of(std::vector<double> differences) {
     constexpr double of_variance = 20.0, quarter = 0.1015;  // 1 + 9 + 9 + 1; of χ² with one degree of freedom
     const auto at = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 4);
@@ -133,8 +133,8 @@ class PathTimes {
     for (std::size_t k = std::max<std::size_t>(from, 1); k < to; ++k) best_[k] = best_at(k);
   }
 
-  /// Of the step to frame k, as its neighbours are now. Few frames and some have to speak for it: of few it explains
-  /// only the error of one of them, of some only an acceleration.
+  /// Best change of the step to frame k, given its neighbours. Both `few` and `some` must support it: within few frames
+  /// it may explain just the error of one of them, within some just an acceleration.
   [[nodiscard]] LongerStep best_at(std::size_t k) const {
     LongerStep best;
     const auto try_all = [&](std::initializer_list<int> nums) {
@@ -163,7 +163,7 @@ class PathTimes {
     return window.gain(times, longer, reach, static_cast<Eigen::Index>(k - first) - 1);
   }
 
-  /// Poses of some frames in a row, from the middle one.
+  /// Poses of consecutive frames, relative to the middle one.
   class Window {
    public:
     Window(const PathTimes& path, std::size_t from, std::size_t to)
@@ -175,7 +175,7 @@ class PathTimes {
             log_so3(from_middle.rotation).transpose();
       }
     }
-    /// Of the step after a frame.
+    /// Twice the log likelihood ratio of other times, for the step after a frame.
     [[nodiscard]] double gain(const Eigen::VectorXd& times, const Eigen::VectorXd& others, const Reach& reach,
                               Eigen::Index after) const {
       const Eigen::MatrixXd one = terms(times, reach, after), other = terms(others, reach, after);
@@ -191,7 +191,7 @@ class PathTimes {
     std::size_t first, last;
 
    private:
-    /// Powers of time, and where there is a bend those of the time after it.
+    /// Powers of time and, with a bend, those of the time after it.
     [[nodiscard]] static Eigen::MatrixXd terms(const Eigen::VectorXd& times, const Reach& reach, Eigen::Index bend) {
       const Eigen::Index num = times.size(), order = reach.order(num);
       const double middle = 0.5 * (times[0] + times[num - 1]), half = times[num - 1] - middle;
@@ -204,7 +204,7 @@ class PathTimes {
       }
       return all;
     }
-    /// Sums of squares of each component about its best combination of terms.
+    /// Sum of squared residuals of each component.
     [[nodiscard]] Eigen::Array<double, 6, 1> left(const Eigen::MatrixXd& terms) const {
       const Eigen::HouseholderQR<Eigen::MatrixXd> qr(terms);
       Eigen::Matrix<double, Eigen::Dynamic, 6> turned = poses_;
@@ -214,7 +214,7 @@ class PathTimes {
     Eigen::Matrix<double, Eigen::Dynamic, 6> poses_;
   };
 
-  /// In periods, with what is missing before each.
+  /// In periods, including the missing frames before each.
   [[nodiscard]] Eigen::VectorXd times_of(const Window& window, const std::vector<int>& missing) const {
     Eigen::VectorXd times(static_cast<Eigen::Index>(window.last - window.first));
     int num = 0;
@@ -226,15 +226,15 @@ class PathTimes {
     return times;
   }
 
-  std::vector<const PathStep*> steps_;  ///< With a pose by their own observations,
-  std::vector<std::size_t> index_;      ///< and which of the path they are.
-  std::vector<int> missing_;            ///< Before each.
-  std::vector<int> pattern_;            ///< Steps in periods, again and again; empty: none.
+  std::vector<const PathStep*> steps_;  ///< Frames with a pose from their own observations,
+  std::vector<std::size_t> index_;      ///< and their indices in the path.
+  std::vector<int> missing_;            ///< Missing frames before each.
+  std::vector<int> pattern_;            ///< Repeating steps in periods; empty: none.
   std::vector<LongerStep> best_;
   double period_s_ = 0.0;
 };
 
-/// Before which frames how many, of the first few.
+/// The first few places, with the number of missing frames.
 std::string places_text(const Localization& report) {
   constexpr std::size_t most_named = 3;
   std::string where;

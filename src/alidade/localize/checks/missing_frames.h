@@ -7,18 +7,18 @@
 
 namespace alidade {
 
-/// Where frames of a constant rate are missing though their times say that none is: the camera comes further from one
-/// frame to the next than before and after it, in all six components as far as it would have in two, three … periods.
-/// Poses around the step are a polynomial of time but for errors of one unknown variance each; by how much a longer
-/// step lowers their sum of squares is its likelihood ratio, ν log(S₁/S_m), summed over the components. Where some of
+/// Missing frames of a constant rate, not shown by the times: the camera moves further between two frames than before
+/// and after, in all six components by as much as in two, three … periods. Model: poses around the step are a
+/// polynomial of time, with errors of one unknown variance per component; likelihood ratio of a longer step: ν
+/// log(S₁/S_m), summed over the components. Patterns: frame_pattern.h. Empty if frames have no usual period.
 /// every few frames are missing, frame_pattern.h says it. Nothing where frames have no usual period.
 struct FoundMissing {
-  std::vector<MissingFrames> frames;  ///< In order.
-  std::vector<int> pattern;           ///< Steps in periods, again and again; empty: none.
+  std::vector<MissingFrames> frames;  ///< In order of time.
+  std::vector<int> pattern;           ///< Repeating steps in periods; empty: none.
 };
 [[nodiscard]] FoundMissing missing_frames(std::span<const PathStep> path);
 
-/// Where there are any: the path is right where each frame was taken, and wrong at the times that they bear.
+/// Reports missing frames: the path is right at the true times of the frames, and wrong at the given ones.
 void add_missing(const Localization& report, Verdict& verdict);
 
 }  // namespace alidade

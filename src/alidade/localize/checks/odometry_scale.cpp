@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-/// How far each reading is from the median of those around it, where the path has taken its part; 0 where there is no
+/// Distance of each reading from the median of its neighbours, after subtraction of the path's motion; 0 outside the
 /// path.
 std::vector<double> away_from_neighbours(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
   constexpr std::size_t each_side = 3;
@@ -45,8 +45,8 @@ std::vector<double> away_from_neighbours(std::span<const OdometryReading> readin
   return away;
 }
 
-/// Without those that are far from where the readings around them are, whatever drifts: a wheel that is lifted, a
-/// message that is wrong. Of a jump that lasts none.
+/// Removes readings far from their neighbours, whatever drifts: a lifted wheel, a corrupted message. A lasting jump is
+/// not removed.
 std::vector<OdometryReading> without_far(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
   constexpr int rounds = 2;
   constexpr double far = 4.0;  // over the median
@@ -61,7 +61,7 @@ std::vector<OdometryReading> without_far(std::span<const OdometryReading> readin
   return near;
 }
 
-/// At the times of the readings, by a clock that is late by so much.
+/// Positions at the times of the readings, for a clock that is late by `late_s`.
 std::vector<Place> places_of(std::span<const OdometryReading> readings, double late_s, std::span<const PathStep> path) {
   std::vector<Place> places;
   for (std::size_t i = 0; i < readings.size(); ++i) {
@@ -75,13 +75,13 @@ std::vector<Place> places_of(std::span<const OdometryReading> readings, double l
   return places;
 }
 
-/// Sums of squares over some places.
+/// Sums of squares over a part of the places.
 struct PartFit {
-  double extent_m2 = 0.0;   ///< Of the vehicle's from their middle.
-  double of_path_m2 = 0.0;  ///< Of what the path's σ explains of what is left over.
+  double extent_m2 = 0.0;   ///< Of the vehicle's positions, about their mean.
+  double of_path_m2 = 0.0;  ///< Part of the residuals that the path's σ explains.
 };
 
-/// What is left over of a similarity of some places, in metres, and of those along a line of their distances on it.
+/// Residuals of a similarity fit to a part, in metres; along a line, those of the distances on it.
 std::vector<Eigen::Vector3d> left_over(std::span<const Place> places, PartFit& part) {
   std::vector<Eigen::Vector3d> of_path, of_vehicle, left;
   Eigen::Vector3d middle_of_path = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();
@@ -114,11 +114,11 @@ std::vector<Eigen::Vector3d> left_over(std::span<const Place> places, PartFit& p
   return left;
 }
 
-/// How a path fits odometry, fifth by fifth of the way: odometry's frame turns with its errors.
+/// Fit of a path to odometry, separately for each fifth of the way: odometry's frame rotates with its errors.
 struct WayFit {
-  double misfit_m2 = std::numeric_limits<double>::infinity();  ///< Mean square of what is left over.
-  double persistent = 1.0;     ///< RMS of what of that is persistent, over that of the vehicle's places.
-  double num_independent = 1;  ///< As many readings determine as much.
+  double misfit_m2 = std::numeric_limits<double>::infinity();  ///< Mean squared residual.
+  double persistent = 1.0;     ///< RMS of its persistent part, over that of the vehicle's positions.
+  double num_independent = 1;  ///< Effective number of independent readings.
 };
 
 WayFit way_fit(std::span<const Place> places) {
@@ -136,7 +136,7 @@ WayFit way_fit(std::span<const Place> places) {
     const std::vector<Eigen::Vector3d> left = left_over(places.subspan(begin, end - begin), part);
     extent += part.extent_m2;
     const double here = static_cast<double>(left.size());
-    // seven numbers of three coordinates each
+    // seven parameters, three coordinates per place
     const double freed = 3.0 * here / (3.0 * here - 7.0);
     const double of_part = here * freed * persistent_square(left);
     alike += of_part;
@@ -149,8 +149,8 @@ WayFit way_fit(std::span<const Place> places) {
   return {squares / num, std::sqrt(persistent / extent), num * (1.0 - correlation) / (1.0 + correlation)};
 }
 
-/// How far a path leaves the plane that it is nearest to, over all of it: to an odometry of two coordinates that is
-/// lost.
+/// Relative distance of a path from its best plane, over all of it: planar odometry does not measure
+/// that.
 double out_of_plane(std::span<const Place> places) {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Place& place : places) middle += place.of_path / static_cast<double>(places.size());
@@ -160,8 +160,8 @@ double out_of_plane(std::span<const Place> places) {
   return squares.sum() > 0.0 ? std::sqrt(std::max(squares[0], 0.0) / squares.sum()) : 0.0;
 }
 
-/// How late odometry's clock is, where that explains clearly more than no offset: the least of a parabola through the
-/// best of a grid.
+/// Delay of odometry's clock, if it explains significantly more than none: the minimum of a parabola through the best
+/// of a grid.
 double clock_by(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
   constexpr double step_s = 0.05, fine_s = 0.015, clear = 12.0;  // of χ², 3.5σ
   constexpr int most = 20;
@@ -184,8 +184,8 @@ double clock_by(std::span<const OdometryReading> readings, std::span<const PathS
   return near_s + fine_s * bottom(misfit_at(near_s - fine_s), misfit_at(near_s), misfit_at(near_s + fine_s));
 }
 
-/// Between two frames a path errs less than at one, which draws a clock there: that of the path without jitter, where
-/// that fits better.
+/// Interpolation makes errors of the path smaller between two frames than at one, which attracts the clock: uses the
+/// path without jitter, if that fits better.
 double clock_of(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
   const double late_s = clock_by(readings, path);
   if (late_s == 0.0) return 0.0;
@@ -195,7 +195,7 @@ double clock_of(std::span<const OdometryReading> readings, std::span<const PathS
   return smooth_s != 0.0 && way_fit(places_of(readings, smooth_s, smooth)).misfit_m2 < misfit ? smooth_s : late_s;
 }
 
-/// A time constant and a clock of odometry, how the path as it shows it fits, and its scale.
+/// Time constant and clock of odometry, the fit of the filtered path, and its scale.
 struct Followed {
   double tau_s = 0.0, late_s = 0.0;
   WayFit fit;
@@ -213,10 +213,10 @@ std::optional<Followed> followed(std::span<const OdometryReading> readings, doub
   return std::isfinite(one.fit.misfit_m2) ? std::optional(std::move(one)) : std::nullopt;
 }
 
-/// Filters, and clocks beside them: a filter delays the way by its time constant, as a late clock does, and rounds its
-/// turns off, as no clock does. One that is not of first order is like one with a delay; one of samples, whose newest
-/// counts at once, is like one that is early by half of the time between two. Nothing is looked for where
-/// the clock is right and neighbours err by themselves.
+/// Candidate filters with clocks: a low-pass filter delays the way by its time constant, as a late clock does, and
+/// rounds off its corners, as no clock does. One of higher order is like one with a delay; a sampled one, whose newest
+/// sample counts at once, is like one that is early by half a sample interval. Skipped if the clock is right and
+/// residuals are not autocorrelated.
 std::vector<Followed> filters_of(std::span<const OdometryReading> readings, const Followed& clock,
                                  std::span<const PathStep> path) {
   constexpr double first_s = 0.05, last_s = 1.5, ratio = 1.15, step_s = 0.05, alike = 3.0;
@@ -235,8 +235,8 @@ std::vector<Followed> filters_of(std::span<const OdometryReading> readings, cons
   return filters;
 }
 
-/// What odometry says with a clock alone, or with a filter where that explains clearly more; each filter counts by its
-/// likelihood, and their scatter is in σ.
+/// The fit with a clock alone, or with a filter if that explains significantly more; the scale is the mean over all,
+/// weighted by likelihood, and their scatter is included in σ.
 Followed averaged(Followed clock, const std::vector<Followed>& filters) {
   constexpr double clear = 12.0;  // of χ², 3.5σ
   if (filters.empty()) return clock;
@@ -258,7 +258,7 @@ Followed averaged(Followed clock, const std::vector<Followed>& filters) {
   return chosen;
 }
 
-/// With the clock and the filter that they show.
+/// The best fit, with clock and filter estimated.
 std::optional<Followed> followed_best(std::span<const OdometryReading> readings, std::span<const PathStep> path) {
   auto clock = followed(readings, 0.0, clock_of(readings, path), path);
   if (!clock) return std::nullopt;
@@ -268,7 +268,7 @@ std::optional<Followed> followed_best(std::span<const OdometryReading> readings,
   return averaged(*std::move(clock), filters);
 }
 
-/// As if the wheels had not slipped there: what is behind goes back by as much.
+/// Readings with the slip removed: later ones are shifted back by the same amount.
 std::vector<OdometryReading> without_slip(std::span<const OdometryReading> readings, std::span<const Place> places,
                                           const Slip& slip) {
   std::vector<OdometryReading> mended(readings.begin(), readings.end());
@@ -281,7 +281,7 @@ std::vector<OdometryReading> without_slip(std::span<const OdometryReading> readi
   return mended;
 }
 
-/// With the stretches left out on which wheels slip, as far as the rest then fits clearly better.
+/// The best fit with slips removed, as long as the rest then fits significantly better.
 std::optional<Followed> followed_without_slips(std::vector<OdometryReading>& readings, std::span<const PathStep> path,
                                                ReadScale& read) {
   constexpr int most = 3;

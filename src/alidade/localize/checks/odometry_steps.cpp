@@ -21,8 +21,8 @@ struct Step {
 
 /// Variances of each coordinate.
 struct StepNoise {
-  double white = 1.0;  ///< Of a place.
-  double walk = 1e-3;  ///< Of a step, that lasts.
+  double white = 1.0;  ///< Of a position.
+  double walk = 1e-3;  ///< Of a step; accumulates.
   [[nodiscard]] double of_step() const { return 2.0 * white + walk; }
 };
 
@@ -37,7 +37,7 @@ std::vector<Step> steps_of(std::span<const Place> places) {
   return steps;
 }
 
-/// C⁻¹ S of the path's steps S that follow each other: two of them share a place, and its error.
+/// C⁻¹ S for the path's consecutive steps S: neighbours share a position, and its error.
 std::vector<Eigen::Vector3d> weighed(std::span<const Step> steps, const StepNoise& noise) {
   std::vector<Eigen::Vector3d> x(steps.size());
   std::vector<double> upper(steps.size());
@@ -77,15 +77,15 @@ PartSums sums_of(std::span<const Step> steps, const StepNoise& noise) {
   const Svd svd = svd_of(products);
   sums.vehicle_from_path = svd.U * svd.V.transpose();
   sums.num = svd.values.sum();
-  // The rotation that fits best makes it too large, by 1.5 over the scale.
+  // The best rotation biases it upwards, by 1.5 over the scale.
   constexpr double of_rotation = 1.5;
   if (sums.num > 0.0) sums.num -= std::min(of_rotation * sums.den / sums.num, 0.5 * sums.num);
   return sums;
 }
 
-/// Median of squares of what is left over of so many steps together, as a variance of each coordinate.
+/// Variance of each coordinate of the residuals, from the median of squares of sums over `together` steps.
 double variance_of(std::span<const Step> steps, std::size_t together, bool is_in_plane) {
-  constexpr double middle_of_two = 1.386, middle_of_three = 2.366;  // of χ², the median
+  constexpr double middle_of_two = 1.386, middle_of_three = 2.366;  // medians of χ²
   std::vector<double> squares;
   for (std::size_t i = 0; i + together <= steps.size(); ++i) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -127,7 +127,7 @@ AllSums all_sums(std::span<const Step> steps, const StepNoise& noise) {
   return all;
 }
 
-/// What is left over of each step, and which are far off.
+/// Residual of each step.
 void take_left(const AllSums& all, std::vector<Step>& steps) {
   std::size_t at = 0;
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -137,7 +137,7 @@ void take_left(const AllSums& all, std::vector<Step>& steps) {
   }
 }
 
-/// As the parts scatter, over what their variances say; at least 1.
+/// Scatter of the parts over their variances; at least 1.
 double scatter_of(const AllSums& all) {
   constexpr std::size_t enough = 5;
   double chi2 = 0.0, num = 0.0;
@@ -150,7 +150,7 @@ double scatter_of(const AllSums& all) {
   return num > 1.0 ? std::max(1.0, chi2 / (num - 1.0)) : 1.0;
 }
 
-/// Steps as they fit the path, those far from all others not used.
+/// The steps as fitted to the path; outliers are not used.
 struct FittedSteps {
   std::vector<Step> steps;
   StepNoise noise;
@@ -173,7 +173,7 @@ std::optional<FittedSteps> fitted_steps(std::span<const Place> places) {
   return fitted.all.scale() > 0.0 ? std::optional(std::move(fitted)) : std::nullopt;
 }
 
-/// A stretch of steps against all: what its own scale gains of χ².
+/// A part of the steps with its own scale: the decrease of χ² by it.
 struct Stretch {
   std::size_t begin = 0, end = 0;
   double ratio = 1.0, gain = 0.0;
@@ -190,9 +190,9 @@ Stretch stretch_of(std::span<const Step> in_path, const StepNoise& noise, double
   return {begin, end, num / (den * scale), (num - scale * den) * (num - scale * den) / den};
 }
 
-/// Of all stretches that of most gain, its ends as they are best.
+/// The part with the largest gain; its ends are optimised.
 Stretch most_gain(std::span<const Step> in_path, const StepNoise& noise, double scale) {
-  constexpr std::size_t fewest = 5, longest = 4;  // of all a quarter
+  constexpr std::size_t fewest = 5, longest = 4;  // at most a quarter of all
   const std::size_t num = in_path.size();
   Stretch best;
   const auto look = [&](std::size_t begin, std::size_t end) {

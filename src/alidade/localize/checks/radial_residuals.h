@@ -9,8 +9,8 @@
 
 namespace alidade {
 
-/// Collects what observations are off from the map after their update, outward or inward of the image's centre. A map
-/// takes up much of what a wrong lens does, but not all at every radius.
+/// Collects the radial component of residuals, about the image centre, after the map's update. A map absorbs much of
+/// the effect of a wrong lens, but not all of it at every radius.
 class RadialResiduals {
  public:
   void add(const LocalizationFilter& filter, std::span<const FeatureObservation> observations,

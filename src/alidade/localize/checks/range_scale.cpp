@@ -9,13 +9,13 @@
 #include "alidade/localize/checks/beam_scales.h"
 #include "alidade/localize/checks/scale_readings.h"
 
-// A rangefinder's scale: where its beam meets the surface that the map's points lie on.
+// A rangefinder's scale: where its beam meets the surface of the map's points.
 
 namespace alidade {
 
 namespace {
 
-/// Those on surfaces that are as smooth as most: around an edge six points are on two of them.
+/// Keeps those on surfaces as smooth as most: at an edge the six nearest points are on two surfaces.
 void reject_rough(std::vector<BeamScale>& scales) {
   constexpr double rougher = 3.0, smooth = 0.001;
   std::vector<double> sizes;
@@ -24,7 +24,7 @@ void reject_rough(std::vector<BeamScale>& scales) {
   std::erase_if(scales, [&](const BeamScale& each) { return each.roughness > limit; });
 }
 
-/// Those near their median.
+/// Keeps those near their median.
 void reject_far(std::vector<BeamScale>& scales) {
   constexpr double far = 4.0;  // of their robust σ
   std::vector<double> logs, sizes;
@@ -35,12 +35,12 @@ void reject_far(std::vector<BeamScale>& scales) {
   std::erase_if(scales, [&](const BeamScale& each) { return std::abs(each.log_scale - median) > limit; });
 }
 
-/// ln of the scale, with the scatter of blocks of time as its σ.
+/// ln of the scale, with σ from the scatter of blocks.
 struct MeanScale {
   double log_scale = 0.0, sigma = 0.0;
 };
 
-/// The same in the order of where they meet the surface: its shape is the same whenever the beam comes back.
+/// The scales in order of the met positions: the surface's shape is the same whenever the beam returns.
 std::vector<BeamScale> by_place(std::span<const BeamScale> scales) {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const BeamScale& each : scales) middle += each.met_in_world / static_cast<double>(scales.size());
@@ -66,18 +66,18 @@ MeanScale mean_of_blocks(std::span<const BeamScale> scales) {
   return {mean, std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0))};
 }
 
-constexpr double instrument_m = 0.1;  ///< An offset of the readings is about as long as that, from its other end.
+constexpr double instrument_m = 0.1;  ///< Offset of readings that are measured from the other end of the instrument.
 
-/// Something of the beam or its readings that is not as given: scale_i = S + x_i · by, with x of a reading the more,
-/// the more that changes its scale.
+/// A systematic error of the beam or its readings: scale_i = S + x_i · by, with x proportional to the effect on the
+/// scale of a reading.
 struct BeamFault {
-  Eigen::Index num = 1;  ///< Of its numbers.
+  Eigen::Index num = 1;  ///< Number of parameters.
   Eigen::VectorXd (*x_of)(const BeamScale&);
-  double clear, half_clear;  ///< Of T² with nine degrees of freedom: as seldom as 3.5σ and 2σ of a normal distribution.
-  double ordinary;           ///< σ of one that is there. [m, rad, s]
-  bool is_length = false;  ///< As the shape of a surface is, which is the same from near and far.
+  double clear, half_clear;  ///< Of T² with nine degrees of freedom: p as for 3.5σ and 2σ of a normal distribution.
+  double ordinary;           ///< σ if present. [m, rad, s]
+  bool is_length = false;    ///< As the shape of a surface is, which is the same from near and far.
 };
-/// All readings are too long by one length.
+/// All readings are too long by the same length.
 const BeamFault offset_fault{1,
                              [](const BeamScale& each) { return Eigen::VectorXd::Constant(1, each.of_offset).eval(); },
                              28.6,
@@ -92,8 +92,8 @@ const BeamFault clock_fault{1, [](const BeamScale& each) { return Eigen::VectorX
                             28.6, 5.4, 0.1};
 
 struct FaultFit {
-  double scale = 1.0, left2 = 0.0;   ///< What is left over, squared.
-  Eigen::VectorXd by, mean, spread;  ///< Of x, and its standard deviations.
+  double scale = 1.0, left2 = 0.0;   ///< Sum of squared residuals.
+  Eigen::VectorXd by, mean, spread;  ///< Estimate; mean and standard deviation of x.
 };
 
 std::optional<FaultFit> fault_fit(const BeamFault& fault, std::span<const BeamScale> scales, std::size_t but_begin,
@@ -124,14 +124,14 @@ std::optional<FaultFit> fault_fit(const BeamFault& fault, std::span<const BeamSc
   return fit;
 }
 
-/// A fault as estimated: by the jackknife over blocks of time, the surface's shape and what is known of the beam.
+/// An estimated fault; σ from the jackknife over blocks, the surface's shape and the prior of the beam.
 struct FoundFault {
   FaultFit fit;
   double sigma_log_scale = 0.0, T2 = 0.0;
   Eigen::MatrixXd cov_by;
 };
 
-/// `of_surface`: relative error of each scale by the surface's shape, which may follow x.
+/// `of_surface`: relative error of each scale by the surface's shape, which may be correlated with x.
 std::optional<FoundFault> found_by_blocks(const BeamFault& fault, std::span<const BeamScale> scales,
                                           const Eigen::MatrixXd& of_beam, double of_surface) {
   const auto fit = fault_fit(fault, scales, 0, 0);
@@ -157,7 +157,7 @@ std::optional<FoundFault> found_by_blocks(const BeamFault& fault, std::span<cons
   return found;
 }
 
-/// By blocks of time or of the surface, whichever differ more.
+/// By blocks of time or of position on the surface, whichever scatter more.
 std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const BeamScale> scales,
                                       const Eigen::MatrixXd& of_beam, double of_surface) {
   const auto by_time = found_by_blocks(fault, scales, of_beam, of_surface),
@@ -166,12 +166,12 @@ std::optional<FoundFault> found_fault(const BeamFault& fault, std::span<const Be
   return of_places->T2 < by_time->T2 ? of_places : by_time;
 }
 
-/// How much of the scale an offset of the readings would be that is as long as an instrument, measured from its other
-/// end, where no covariance of the beam and not the readings themselves exclude it: a surface's shape, or a distance
-/// that hardly changes, hides it. 0: it would show.
+/// Relative scale error if the readings had an offset of the length of an instrument, measured from its other end,
+/// unless a covariance of the beam or the readings themselves exclude it: the shape of a surface, or a nearly constant
+/// distance, hides it. 0: it would be detected.
 double hidden_offset(std::span<const BeamScale> scales, const Beam& beam, const std::optional<FoundFault>& offset,
                      double scale) {
-  constexpr double sigmas = 3.3;  // an offset so large is beyond 2σ, that is in doubt, in five of six cases
+  constexpr double sigmas = 3.3;  // an offset of that size exceeds 2σ, in doubt, in five of six cases
   if (beam.cov.diagonal().maxCoeff() > 0.0) return 0.0;
   if (offset && sigmas * std::sqrt(offset->cov_by(0, 0)) < instrument_m) return 0.0;
   double of_offset = 0.0;
@@ -179,9 +179,9 @@ double hidden_offset(std::span<const BeamScale> scales, const Beam& beam, const 
   return instrument_m * of_offset / scale;
 }
 
-/// What a fault that the readings hardly show and do not exclude may be of the scale, relative: of so many beams one
-/// reads from its housing's other end, say, or was moved since it was calibrated. Its size is that by the readings and
-/// by what is ordinary; that it is there has the probability by Bayes' rule.
+/// RMS relative scale error by a fault that the readings neither show nor exclude: a certain share of beams is measured
+/// from the other end of the housing, say, or was moved after calibration. Its size is from the readings and the usual
+/// σ; the probability of its presence from Bayes' rule.
 double possible_share(const BeamFault& fault, const FoundFault& found, const Beam& beam, double scale) {
   constexpr double share_of_calibrated = 0.2, share_of_others = 0.5, surest = 50.0;
   const double share = beam.cov.diagonal().maxCoeff() > 0.0 ? share_of_calibrated : share_of_others;
@@ -195,7 +195,7 @@ double possible_share(const BeamFault& fault, const FoundFault& found, const Bea
   return std::sqrt(odds / (1.0 + odds) * size2);
 }
 
-/// The data as they are without a fault of this size.
+/// The data, corrected for a fault of this size.
 struct CorrectedData {
   std::vector<RangeReading> readings;
   Beam beam;
@@ -212,16 +212,16 @@ CorrectedData without_fault(const RangeData& data, const BeamFault& fault, const
   return corrected;
 }
 
-/// A fault that the readings show clearly, as large as it explains them best, and how well it then does.
+/// A fault that is significant, with its best estimate and its fit.
 struct Cause {
   const BeamFault* fault = nullptr;
   FoundFault found;
   Eigen::VectorXd by;
-  double misfit = 0.0;  ///< Robust σ of the scales that are left. [relative]
+  double misfit = 0.0;  ///< Robust relative σ of the residual scales.
 };
 
-/// It is linear for small ones only: a beam that points elsewhere meets other surfaces.
-/// `num_given`: how many readings have a surface as they are.
+/// Iterated, as it is nonlinear: a beam that points elsewhere meets other surfaces.
+/// `num_given`: number of readings that have a surface without correction.
 std::optional<Cause> cause_of(const RangeData& data, const BeamFault& fault, FoundFault found,
                               const Eigen::MatrixXd& of_beam, std::size_t num_given) {
   constexpr int rounds = 3;
@@ -248,8 +248,8 @@ std::optional<Cause> cause_of(const RangeData& data, const BeamFault& fault, Fou
   return cause;
 }
 
-/// Where the readings say that they are all too long or late, or that the beam points elsewhere, that which explains
-/// most is estimated; where they half say so, its effect is in σ, where they do not what it may be.
+/// Estimates the fault (offset, clock or direction) that explains most, if one is significant. If one is doubtful, its
+/// effect is added to σ; otherwise, its possible effect.
 void add_faults(const RangeData& data, std::span<const BeamScale> scales, double of_surface, ReadScale& read) {
   const Beam& beam = data.beam;
   const Eigen::Vector3d along = beam.direction_in_cam;
@@ -283,7 +283,7 @@ void add_faults(const RangeData& data, std::span<const BeamScale> scales, double
     read.sigma_rel = std::hypot(read.sigma_rel,
                                 found->T2 > fault.half_clear ? doubted : possible_share(fault, *found, beam, before));
   };
-  // Where hardly anything determines an offset, what an instrument has is surer.
+  // If an offset is hardly determined, the usual size for an instrument is the better estimate.
   const double known = offset ? offset->cov_by(0, 0) / (instrument_m * instrument_m) : 0.0;
   count(offset_fault, offset, 1.0 / (1.0 + known));
   count(direction_fault, direction, 1.0);
@@ -307,7 +307,7 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   const MeanScale of_time = mean_of_blocks(scales), of_places = mean_of_blocks(by_place(scales));
   const MeanScale mean = of_places.sigma > of_time.sigma ? of_places : of_time;
   ReadScale read{std::exp(mean.log_scale), 0.0, scales.size(), num_given - scales.size()};
-  // A curved surface is on one side of every plane through its points, by about as much as they are off it.
+  // A curved surface lies on one side of every plane through its points, by about their roughness.
   read.sigma_rel = std::hypot(mean.sigma, sigma_by_beam(data), roughness);
   read.other_log_scale = other_log_scale;
   add_faults(data, scales, roughness, read);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t num_across = 4, num_down = 3;
 
-/// Residuals over σ that may have a mean, each of a point.
+/// Mean of residuals over σ, with their points.
 class MeanResidual {
  public:
   void add(long id, double residual, double residual_px) {
@@ -27,7 +27,7 @@ class MeanResidual {
     constexpr std::size_t few_points = 8;
     return num_ >= least && (!lasts || of_point_.size() >= few_points);
   }
-  /// Changes of the residuals by something that all of them share.
+  /// Adds changes of a residual by a common cause.
   void add_moves(const Eigen::RowVectorXd& moves) {
     if (moves_.size() == 0) moves_.setZero(moves.size());
     moves_ += moves;
@@ -35,8 +35,8 @@ class MeanResidual {
   [[nodiscard]] Eigen::RowVectorXd moves() const { return moves_ / num_; }
   [[nodiscard]] double mean() const { return sum_ / num_; }
   [[nodiscard]] double mean_px() const { return sum_px_ / num_; }
-  /// Of the mean, by chance. Of points: its square over that is one of Student's t with one number less than they are,
-  /// over its own mean.
+  /// Variance of the mean by chance. For clusters by point, mean²/variance is the square of Student's t with one degree
+  /// of freedom less than there are points, over its own mean.
   [[nodiscard]] double variance(bool lasts) const {
     if (!lasts) return 1.0 / num_;
     double squares = 0.0;
@@ -64,7 +64,7 @@ std::string name_of(std::size_t part) {
 
 double found_sigma_px(const PlacedResidual& residual) { return residual.error_factor * residual.sigma_px; }
 
-/// Correlation of what neighbours in time have, of the same point.
+/// Correlation of residuals of the same point in consecutive frames.
 void add_autocorrelation(std::span<const PlacedResidual> residuals, ResidualStructure& structure) {
   std::map<long, const PlacedResidual*> last;
   double products = 0.0, squares = 0.0, num = 0.0;
@@ -112,7 +112,7 @@ ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, 
   }
   if (!(num > 0.0)) return structure;
   structure.mean_chi2 /= num;
-  constexpr double z = 3.09;  // of a χ² by Wilson & Hilferty 1931
+  constexpr double z = 3.09;  // of χ², by Wilson & Hilferty 1931
   const double w = 2.0 / (9.0 * num);
   structure.mean_chi2_limit = std::pow(1.0 - w + z * std::sqrt(w), 3);
   return structure;
@@ -120,7 +120,7 @@ ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, 
 
 namespace {
 
-/// Squares of the means over their covariance, which have in common what moves them together.
+/// χ² of the means, with the covariance by common causes.
 double chi2_of(std::span<const MeanResidual> means, bool lasts, bool has_moves) {
   const auto num = static_cast<Eigen::Index>(means.size());
   Eigen::VectorXd mean(num);

@@ -9,15 +9,15 @@
 
 namespace alidade {
 
-/// `residuals`: in the order of frames. Where errors last from frame to frame, those of a point count as one: the
-/// variance of a mean is that of the points' sums, and a mean of few points says nothing.
+/// `residuals`: in order of frames. If errors are autocorrelated, those of a point are one cluster: the variance of a
+/// mean is that of the points' sums, and a mean of few points is not used.
 [[nodiscard]] ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, const Camera& camera);
 
-/// By how much a residual changes [px] where the lens is off by σ, path and map following: by independent columns.
+/// Changes of a residual [px] by 1σ errors of the lens, with path and map following: one column per independent error.
 using ResidualMoves = std::function<Eigen::Matrix2Xd(const PlacedResidual&)>;
 
-/// The same in rings about the image centre, of what is off outward or inward. `lasts`: errors do. What a lens within
-/// its covariance leaves is chance (`moves`; none: it is exact).
+/// The same for the radial component in rings about the image centre. `lasts`: errors are autocorrelated. Effects of a
+/// lens within its covariance (`moves`; empty: it is exact) count as chance.
 [[nodiscard]] RadialStructure radial_structure(std::span<const PlacedResidual> residuals, const Camera& camera,
                                                bool lasts, const ResidualMoves& moves = {});
 

@@ -13,7 +13,7 @@ namespace alidade {
 
 namespace {
 
-/// The two frames around a time that have a pose, and the share of the second.
+/// The two frames around a time, and the weight of the second.
 template <typename Step>
 struct Around {
   const Step *before = nullptr, *after = nullptr;
@@ -79,7 +79,7 @@ SensorPath SensorPath::filtered(double tau_s) const {
   bool has_last = false;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     if (has_last && steps[i].is_shown) {
-      // Between two frames the path is straight.
+      // The path is linear between two frames.
       const Step &now = steps[i], &before = steps[i - 1];
       const double gap_s = now.t_s - before.t_s, kept = std::exp(-gap_s / tau_s);
       const double of_speed = (1.0 - kept) * tau_s / gap_s;

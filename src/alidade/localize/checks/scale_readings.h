@@ -10,46 +10,46 @@
 #include "alidade/localize/config.h"
 #include "alidade/localize/localization.h"
 
-// Metres from what a vehicle has beside its camera: a pressure sensor, a rangefinder. A path up to scale, by so many
-// times as long, is where they say that it is; a path in metres is checked by them.
+// Scale from other sensors of a vehicle, a pressure sensor or a rangefinder. They scale a path that is known up to
+// scale, and check a path in metres.
 
 namespace alidade {
 
 struct ReadScale {
-  double scale = 1.0;      ///< Metres for each unit of the path.
-  double sigma_rel = 1.0;  ///< Its σ over it.
+  double scale = 1.0;      ///< Metres per unit of the path.
+  double sigma_rel = 1.0;  ///< Relative σ of the scale.
   std::size_t num_used = 0, num_rejected = 0;
-  double late_s = 0.0;     ///< The readings' clock less the path's, where it is off.
-  double offset_m = 0.0;   ///< By which a rangefinder reads too much, where it does.
-  double aside_rad = 0.0;  ///< By which a rangefinder's beam points elsewhere, where it does.
-  /// Share of the scale that 0.1 m too much of every reading would be, where it would not show; else 0.
+  double late_s = 0.0;     ///< Delay of the readings' clock relative to the path's, if significant.
+  double offset_m = 0.0;   ///< Constant excess of a rangefinder's readings, if significant.
+  double aside_rad = 0.0;  ///< Angle by which a rangefinder's beam deviates from the given direction, if significant.
+  /// Relative scale error if all readings were 0.1 m too long, where that would be undetectable; else 0.
   double hidden_offset_rel = 0.0;
-  double lag_s = 0.0;                 ///< Time constant of the filter of a depth sensor or odometry, where it has one.
-  double jump_m = 0.0, jump_s = 0.0;  ///< By which a depth sensor reads more from a time on, where it does.
-  /// ln of another scale over this one, that at least half as many readings of a rangefinder have, of a surface before
-  /// or behind; else 0.
+  double lag_s = 0.0;                 ///< Time constant of a low-pass filter in a depth sensor or odometry, if any.
+  double jump_m = 0.0, jump_s = 0.0;  ///< Jump of a depth sensor's readings, and its time, if any.
+  /// ln of another scale over this one, on which at least half as many readings of a rangefinder agree, from a surface
+  /// before or behind; else 0.
   double other_log_scale = 0.0;
-  double slip_from_s = 0.0, slip_to_s = 0.0, slip_ratio = 0.0;  ///< When odometry slips most, and by what factor.
+  double slip_from_s = 0.0, slip_to_s = 0.0, slip_ratio = 0.0;  ///< Longest slip of odometry: when, and by what factor.
   bool is_drifting = false;
-  double drift_m = 0.0;  ///< By which the offset of a depth sensor has changed at the end, where it drifts.
-  /// Where a depth sensor is in the camera's frame, with σ, where it is not where it was given; else 0.
+  double drift_m = 0.0;  ///< Total change of the offset of a depth sensor, if it drifts.
+  /// Estimated position of a depth sensor in the camera's frame, with σ, if it differs from the given one; else 0.
   Eigen::Vector3d arm_m = Eigen::Vector3d::Zero(), sigma_arm_m = Eigen::Vector3d::Zero();
-  double noise_factor = 1.0;  ///< RMS of what is left of a depth sensor's readings, over their σ.
-  double arm_effect = 0.0;    ///< Change of ln scale where a depth sensor's place, given without σ, is 1 cm off.
+  double noise_factor = 1.0;  ///< RMS of a depth sensor's residuals, over their σ.
+  double arm_effect = 0.0;    ///< Change of ln scale if a depth sensor's position, given without σ, is 1 cm off.
 };
 
-/// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
+/// The pose at a time, interpolated. Empty outside the path, or if one of the two frames around it has no pose.
 [[nodiscard]] std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s);
 
-/// Covariance of the position at a time, in the world [the path's unit²]: of the frame at or after it.
+/// Covariance of the position at a time, in the world frame [the path's unit²]: that of the frame at or after it.
 [[nodiscard]] Eigen::Matrix3d position_cov_at(std::span<const PathStep> path, double t_s);
 
-/// Mean square of what is alike in neighbours of what is left over of readings, in order of time: without half the mean
-/// squared step between two, in the unit of `left`, squared. No number of readings averages that.
+/// Persistent part of the mean square of residuals, in order of time: mean square minus half the mean squared
+/// difference of neighbours, in the unit of `left`, squared. Averaging more readings does not reduce it.
 [[nodiscard]] double persistent_square(std::span<const Eigen::Vector3d> left);
 
-/// Of a path what sensors are shown: where the camera is and how it is rotated, numbers that a filter averages each by
-/// itself.
+/// The input of a sensor from a path: position and rotation of the camera, as components that a low-pass filter
+/// averages independently.
 struct SensorPath {
   using Numbers = Eigen::Matrix<double, 3, 4>;  ///< Position, and the camera's axes.
   struct Step {
@@ -61,72 +61,72 @@ struct SensorPath {
   std::vector<Step> steps;
 
   explicit SensorPath(std::span<const PathStep> path);
-  /// By a filter of first order that has a time constant; nothing before it has forgotten its first value.
+  /// Output of a first-order low-pass filter with that time constant; empty until it has forgotten its first value.
   [[nodiscard]] SensorPath filtered(double tau_s) const;
-  /// Between the two frames around a time. None outside the path, or where one of them has none.
+  /// Interpolated between the two frames around a time. Empty outside the path, or if one of them has no pose.
   [[nodiscard]] std::optional<Numbers> at(double t_s) const;
 };
 
-/// What a sensor with such a filter is shown of a path: positions.
+/// Positions of a path as seen through such a filter.
 [[nodiscard]] std::vector<PathStep> filtered(std::span<const PathStep> path, double tau_s);
 
-/// A path without what differs from frame to frame: positions by parabolas through those within `half_s`. A filter
+/// A path without frame-to-frame jitter: positions from parabolas through those within `half_s`. A sensor's filter
 /// averages such errors of the path, and would seem to explain readings better for that alone.
 [[nodiscard]] std::vector<PathStep> without_jitter(std::span<const PathStep> path, double half_s);
 constexpr double jitter_s = 0.4;
 
-/// Where a depth sensor is in the camera's frame [m].
+/// Position of a depth sensor in the camera's frame [m].
 struct DepthArm {
   Eigen::Vector3d in_cam_m = Eigen::Vector3d::Zero();
-  std::optional<double> sigma_m;  ///< Of each coordinate, which is then estimated. None: not known, and not counted.
+  std::optional<double> sigma_m;  ///< Of each coordinate; it is then estimated. Empty: unknown, not included in σ.
 };
 
-/// depth = offset + g·r + down·R a of the camera's position r and rotation R, and the sensor's place a in the camera:
-/// of unknown offset and direction, |g| is the scale. Its σ is that of what is left over, whose neighbours in time are
-/// alike, and `sigma_rel`, which all share. Readings far from all others are rejected; a clock that is up to a second
-/// off, a filter, a jump or a drift of the offset, and another place than the given one are found by the residuals.
-/// None: the path moves too little up and down, or the readings do not fit it.
+/// depth = offset + g·r + down·R a with the camera's position r and rotation R, and the sensor's position a in the
+/// camera; offset and direction are unknown, |g| is the scale. Its σ is from the residuals, which are autocorrelated,
+/// and from `sigma_rel`, a common error of all readings. Outliers are rejected; a clock that is off by up to a second,
+/// a low-pass filter, a jump or drift of the offset, and a wrong position of the sensor are detected in the residuals.
+/// Empty: too little vertical motion, or the readings do not fit the path.
 [[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings, double sigma_rel,
                                                       std::span<const PathStep> path, const DepthArm& arm = {});
 
-/// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
-/// readings near their median, with the scatter of blocks of them as its σ. Where a score test says clearly that all of
-/// them are too long by one length, that their clock is late or that the beam points elsewhere, that of these without
-/// which they agree best is estimated, too. Readings where points are off their plane do not count where most are on
-/// it. None: too few readings with points around them. Of two surfaces one behind the other that is met which gives
-/// most readings one scale. σ of the beam is in it; where its file has none, 0.5 % of its scale.
+/// Each reading gives the scale at which the beam meets the plane through the map's points around it; the result is the
+/// mean of all near the median, with σ from the scatter of blocks. If a score test is significant for a common offset,
+/// a late clock or another beam direction, the one with which the readings agree best is estimated, too. Readings on
+/// rough surfaces are rejected if most are on smooth ones. Empty: too few readings with points around them. Of two
+/// surfaces, one behind the other, the one is met on which most readings agree. σ includes the covariance of the beam;
+/// without one, 0.5 % of its scale.
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 
-/// The vehicle's steps against the path's (odometry_steps.h), without readings far from those around them, with σ of
-/// what is left over, `sigma_rel`, which all share, and what is persistently left over, beyond the path's σ, of a
-/// similarity of each fifth of the way: slipping lengthens all steps, a plane in which the camera does not stay
-/// shortens them. A clock that is up to a second off, and a filter, are found by the same. None: too few readings,
-/// hardly a way, or readings that do not fit the path.
+/// Fits the vehicle's steps to the path's (odometry_steps.h), without outlier readings. σ is from the residuals,
+/// `sigma_rel`, a common error of all readings, and the persistent residuals, beyond the path's σ, of a similarity of
+/// each fifth of the way: slip lengthens all steps, planar odometry of a camera that leaves the plane shortens them. A
+/// clock that is off by up to a second, and a filter, are found in the same way. Empty: too few readings, hardly any
+/// motion, or readings that do not fit the path.
 [[nodiscard]] std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> readings, double sigma_rel,
                                                          std::span<const PathStep> path);
 
-/// What each of the config's sensors says of `result.path`, into `result.sensor_scales`.
+/// Evaluates each sensor of the config against `result.path`; fills `result.sensor_scales`.
 void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result);
-/// What an IMU said of it when the path was solved, into the same.
+/// Adds the scale that an IMU gave when the path was solved.
 void add_imu_scale(const LocalizeConfig& config, Localization& result);
-/// A sensor's scale against a target's: ln of their ratio, and its σ, that of where the target's points are included.
+/// A sensor's scale against a target's: ln of their ratio, and its σ, including that of the target's points.
 struct ScaleDifference {
   double log_ratio = 0.0, sigma = 1.0;
   [[nodiscard]] double sigmas() const { return std::abs(log_ratio) / sigma; }
 };
 [[nodiscard]] ScaleDifference difference_from_target(const SensorScale& sensor, double sigma_target_scale);
-/// Of the scale by known points, relative, as sure as each is alone.
+/// Relative σ of the scale from known points, with their individual covariances.
 [[nodiscard]] double sigma_target_scale(std::span<const MapPoint> map);
-/// Where a sensor contradicts a target, which of them is wrong is not known: the difference is in the path's σ.
+/// If a sensor contradicts a target, which of them is wrong is unknown: the difference is added to the path's σ.
 /// `sigma_scale`: of the target's size, as given.
 void widen_by_contradictions(double sigma_scale, Localization& result);
 constexpr double contradicts_from = 3.0;  ///< In σ.
 
-/// All of them together, the surer one counting for more. None: nothing determines it.
+/// Weighted mean of the scales of all sensors. Empty: none determines it.
 [[nodiscard]] std::optional<ReadScale> scale_of(const Localization& result);
 
-/// Path and map, longer by the scale about the world's origin; its σ is added to theirs.
+/// Scales path and map about the world's origin; the σ of the scale is added to theirs.
 void apply_scale(const ReadScale& scale, Localization& result);
 
 }  // namespace alidade

@@ -6,12 +6,12 @@
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/path/path_doubt.h"
 
-// What is said of sensors beside the camera, and by them of the scale.
+// Checks of other sensors, and of the scale by them.
 
 namespace alidade {
 namespace {
 
-/// A depth sensor that is not where it was said to be.
+/// A depth sensor that is not at its given position.
 void add_arm(const SensorScale& sensor, Verdict& verdict) {
   const auto three = [](const Eigen::Vector3d& each) {
     return text_of(each.x(), 2) + ", " + text_of(each.y(), 2) + ", " + text_of(each.z(), 2);
@@ -25,9 +25,9 @@ void add_arm(const SensorScale& sensor, Verdict& verdict) {
        sensor.arm_m.norm(), 0.0, "m", "path"});
 }
 
-/// By how much a sensor's readings are late, filtered or too long.
+/// Delay, filter or offset of a sensor's readings, as corrected.
 void add_corrected(const SensorScale& sensor, Verdict& verdict) {
-  constexpr double unnamed_s = 0.1;  // beside a filter: what is left of its delay
+  constexpr double unnamed_s = 0.1;  // beside a filter: the rest of its delay
   if (std::abs(sensor.late_s) > (sensor.lag_s > 0.0 ? unnamed_s : 0.0))
     verdict.checks.push_back({sensor.sensor + " clock", State::care,
                               "the clock of the " + sensor.sensor + " is " + text_of(std::abs(sensor.late_s), 2) +
@@ -119,7 +119,7 @@ std::string unread_text(const SensorScale& sensor, const Localization& report) {
               : "too few of them, or too few points around the beam that lie on a surface");
 }
 
-/// The path's scale by a sensor against that by the first of them, where that has given it, or by the target.
+/// Compares the path's scale by a sensor with that by the first of them, if that one gave it, or by the target.
 void add_agreement(const SensorScale& sensor, const SensorScale* first, const Localization& report, Verdict& verdict) {
   constexpr double bad_z = 6.0;
   constexpr double power_z = contradicts_from + 2.33;  // 99 %
@@ -143,7 +143,7 @@ void add_agreement(const SensorScale& sensor, const SensorScale* first, const Lo
 }
 
 void add_rejected(const SensorScale& sensor, Verdict& verdict) {
-  // A beam may meet what the map has no points of.
+  // A beam may meet surfaces without points in the map.
   const double many = sensor.sensor == "rangefinder" ? 0.5 : 0.2;
   const double rejected = share(sensor.num_rejected, sensor.num_used + sensor.num_rejected);
   if (rejected > many)

@@ -6,12 +6,12 @@
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/map/map_frame.h"
 
-// What all sensors beside the camera say of the scale together.
+// The scale from all other sensors together.
 
 namespace alidade {
 namespace {
 
-/// Of the path, in its unit: differences of the mean rates of seconds one after the other, which noise hardly enters.
+/// Of the path, in its unit: from differences of mean velocities of consecutive seconds, insensitive to noise.
 double rms_acceleration(std::span<const PathStep> path) {
   if (path.empty()) return 0.0;
   constexpr double second = 1.0;
@@ -53,7 +53,7 @@ void take_read(const ReadScale& read, SensorScale& scale) {
   scale.noise_factor = read.noise_factor;
 }
 
-/// Units in which readings are given in error: by a target each of them is known for what it is.
+/// Units in which readings are given by mistake; with a target each can be recognised.
 void take_unit(SensorScale& scale) {
   constexpr double near = 0.1;
   constexpr std::array<std::pair<const char*, double>, 3> units{{{"cm", 100.0}, {"mm", 1000.0}, {"feet", 3.2808}}};
@@ -65,8 +65,8 @@ void take_unit(SensorScale& scale) {
   }
 }
 
-/// What a sensor's unit may be wrong by: with a target that is known, without one a camera that would accelerate so
-/// much shows it. A path by such a scale fits nothing.
+/// Detects a wrong unit of a sensor: with a target by the scale, without one by an implausible acceleration of the
+/// camera. A path in such a scale fits nothing.
 void check_unit(bool has_target, SensorScale& scale) {
   constexpr double too_fast = 10.0;
   if (!(scale.sigma_rel > 0.0)) return;
@@ -86,7 +86,7 @@ void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Lo
     if (read) take_read(*read, scale);
     scale.acceleration = scale.scale * acceleration / config.filter.sigma_a_m_s2;
     scale.arm_given_m = config.depth_arm_m.value_or(Eigen::Vector3d::Zero()).norm();
-    if (!result.has_target) {  // nothing says which
+    if (!result.has_target) {  // unknown which of the two
       scale.sigma_rel = read ? std::hypot(read->sigma_rel, 0.5 * read->other_log_scale) : 0.0;
       scale.other_log_scale = 0.0;
     }
@@ -135,7 +135,7 @@ double sigma_target_scale(std::span<const MapPoint> map) {
 
 ScaleDifference difference_from_target(const SensorScale& sensor, double sigma_target_scale) {
   const double one = std::log(sensor.scale), other = one + sensor.other_log_scale;
-  const double of_target = sensor.sensor == "IMU" ? 0.0 : sigma_target_scale;  // an IMU's has it
+  const double of_target = sensor.sensor == "IMU" ? 0.0 : sigma_target_scale;  // an IMU's σ includes it
   return {std::abs(other) < std::abs(one) ? other : one, std::hypot(sensor.sigma_rel, of_target)};
 }
 

@@ -81,7 +81,7 @@ void add_path_error(Localization& result) {
   if (!path.empty()) result.error = path_error(path, result.truth, result.scale_known, covs);
 }
 
-/// A flat target whose plane is that of x and y, and most poses on the side where it is not seen.
+/// A flat target in the plane of x and y, and most poses on the side from which it cannot be seen.
 bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> target, bool seen_from_plus_z) {
   if (target.size() < 3) return false;
   Eigen::AlignedBox3d box;
@@ -122,7 +122,7 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
   result.radial = smoothed.radial;
   if (result.is_of_images) {
     std::erase_if(result.given,
-                  is_of_targets_points);  // patches of four corners change as they are seen from elsewhere
+                  is_of_targets_points);  // the appearance of patches of four corners changes with the viewpoint
   }
   result.lens_pull = smoothed.lens_pull;
   result.widened = smoothed.widened;
@@ -135,10 +135,10 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
   }
   result.camera = smoothed.camera;
   result.sigma_lens = smoothed.sigma_lens;
-  if (is_other_path) {  // what the filter rejected before it began again, or by another lens, is no longer rejected
+  if (is_other_path) {  // observations that the filter rejected before a restart, or with another lens, may be used now
     result.num_used = smoothed.residuals.size();
     result.num_gated = smoothed.num_dropped;
-    // Where some frames were solved for, the others' observations have no residuals: the filter's count stays.
+    // If only some frames were solved for, observations of the others have no residuals: the filter's count remains.
     if (result.smoothed_every == 1)
       result.num_known_gated = result.num_known - std::min(result.num_known, num_known_fit(smoothed, result.map));
     result.nis_per_dof = smoothed.chi2_per_dof;

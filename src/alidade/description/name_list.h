@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Names in one line, a word before their numbers once: "view 3, 8, 13".
+/// Joins names in one line, with a common word only once before their numbers: "view 3, 8, 13".
 [[nodiscard]] std::string name_list(const std::vector<std::string>& names);
 
 }  // namespace alidade

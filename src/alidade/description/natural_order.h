@@ -4,7 +4,7 @@
 
 namespace alidade {
 
-/// a2 before a10: runs of digits compare as numbers.
+/// Natural order, a2 before a10: runs of digits are compared as numbers.
 [[nodiscard]] bool natural_less(std::string_view a, std::string_view b);
 
 }  // namespace alidade

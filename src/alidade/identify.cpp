@@ -30,8 +30,8 @@ void require_sense(const std::vector<ServoSample>& log) {
   }
 }
 
-/// The log of an encoder that begins again after a turn, unwrapped at each step longer than half a turn; `wraps`: how
-/// many those are. None where the angles cover more than a turn [rad].
+/// The log of an encoder that wraps around, unwrapped at each step longer than half a
+/// turn; `wraps`: how many such steps. Empty if the angles cover more than a turn [rad].
 std::vector<ServoSample> unwrapped(const std::vector<ServoSample>& log, std::size_t& wraps) {
   constexpr double turn_rad = 2.0 * std::numbers::pi;
   const auto [low, high] = std::ranges::minmax_element(log, {}, &ServoSample::angle_rad);
@@ -48,7 +48,7 @@ std::vector<ServoSample> unwrapped(const std::vector<ServoSample>& log, std::siz
   return rows;
 }
 
-/// As read, or unwrapped where that leaves clearly less.
+/// Identifies the log as read or, if that leaves clearly smaller residuals, unwrapped.
 void identify_turns(Identification& result) {
   constexpr double clearly = 0.5;
   static_cast<ServoIdentification&>(result) = identify_servo(result.log, result.config.kind);
@@ -63,7 +63,7 @@ void identify_turns(Identification& result) {
   result.encoder_wraps = wraps;
 }
 
-/// Rows that are rejected: a few do no harm.
+/// Adds the rejected rows as a check; a few do no harm.
 void add_spikes(const std::vector<ServoSample>& log, const std::vector<std::size_t>& rows, Identification& result) {
   constexpr double few = 0.02;
   if (rows.empty()) return;
@@ -79,7 +79,7 @@ void add_spikes(const std::vector<ServoSample>& log, const std::vector<std::size
   result.verdict.sentence += "; " + result.verdict.checks.back().text;
 }
 
-/// The rate of the log's clock, and what of the plant it moves most.
+/// The assumption on the rate of the log's clock, with the plant parameter that it affects most.
 Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
   Assumption clock{.name = "clock_rate", .value = 1.0, .sigma = sigma_clock, .moved = "tau_s"};
   const ServoParams moved = sigma_clock * by_clock_rate(fit);
@@ -93,7 +93,7 @@ Assumption assumed_clock(const ServoFit& fit, double sigma_clock) {
   return clock;
 }
 
-/// What is counted in several parts, such as a wave by its sine and cosine, as one.
+/// Merges flaws that are counted in several parts, such as the sine and cosine of a wave.
 std::vector<CountedFlaw> by_name(const std::vector<CountedFlaw>& counted) {
   std::vector<CountedFlaw> flaws;
   for (const CountedFlaw& each : counted) {
@@ -105,7 +105,7 @@ std::vector<CountedFlaw> by_name(const std::vector<CountedFlaw>& counted) {
   return flaws;
 }
 
-/// A flaw that is counted, and what of the plant it moves most.
+/// The assumption on a counted flaw, with the plant parameter that it affects most.
 Assumption assumed_flaw(const ServoFit& fit, const CountedFlaw& counted) {
   Assumption flaw{.name = counted.name, .value = 0.0, .sigma = counted.sigma, .moved = "gain_rad"};
   flaw.remedy = counted.remedy;
@@ -119,7 +119,7 @@ Assumption assumed_flaw(const ServoFit& fit, const CountedFlaw& counted) {
   return flaw;
 }
 
-/// A command is valid from its own time on: by definition, or, of commands between rows, within a row.
+/// A command takes effect at its own time: by definition or, for commands between rows, within a row.
 Assumption assumed_offset(const ServoIdentification& identified) {
   const double sigma_s = identified.sigma_command_s;
   Assumption offset{.name = "command_offset_s", .value = 0.0, .sigma = sigma_s, .moved = "latency_s"};
@@ -129,7 +129,7 @@ Assumption assumed_offset(const ServoIdentification& identified) {
   return offset;
 }
 
-/// Assumptions. By definition: angles are the encoder's own radians.
+/// All assumptions. By definition, angles are in the encoder's own radians.
 std::vector<Assumption> assumed_of(const Identification& identified, double sigma_clock) {
   const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},

@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// The pixels of the reference, and what is left of them.
+/// The pixels of the reference and their residuals.
 std::vector<ObserveResidual> reference_residuals(const RotationLog& log, const ObserveSolution& solution) {
   const Adjustment& reference = solution.reference;
   std::vector<ObserveResidual> residuals;
@@ -45,7 +45,7 @@ std::vector<TestedCause> tested_causes_of(const std::vector<CauseScore>& scores)
   return causes;
 }
 
-/// What was solved, judged.
+/// The report of a solution, with its verdict.
 ObserveReport judged_observation(ObserveSolution solution, RotationLog log, const ObserveSetup& setup) {
   solution.verdict = observe_verdict(solution, log, setup);
   solution.counts.given = log.rows.size();
@@ -78,27 +78,27 @@ std::size_t num_zooms(const ObserveSolution& solution) {
   }));
 }
 
-/// How much is taken to explain the pixels beside one camera.
+/// Number of parameters that explain the pixels beside those of one camera.
 std::size_t num_explained_by(const ObserveSolution& solution) {
   return static_cast<std::size_t>(CommonLayout(solution.estimated).size) + solution.estimated_errors.size() +
          num_zooms(solution) + (solution.mounting_step ? 3 : 0);
 }
 
-/// Images in the rows of their time leave less, or as much with fewer causes: zooms, a delay or a bump explain a part
-/// of what a gap does. An image that is there twice is none, whatever it leaves.
+/// Solutions with images moved to other rows are better if they have less noise, or as much with fewer causes: zooms, a
+/// delay or a bump explain part of the effect of a gap. Repeated images are removed in any case.
 bool is_better(const ObserveSolution& solution, const ObserveSolution& as_given, const FramePlaces& places) {
   constexpr double less = 0.8, as_much = 1.1;
   const auto is_answer = [](const ObserveSolution& each) { return each.status == ObserveSolution::Status::ok; };
   if (!is_answer(solution) || !is_answer(as_given)) return is_answer(solution);
   if (places.missing.empty() || solution.sigma_px < less * as_given.sigma_px) return true;
-  constexpr std::size_t fewer = 2;  // of a head that stops and goes a delay alone, or a gap before it first moved
+  constexpr std::size_t fewer = 2;  // for a head that stops and goes: a delay alone, or a gap before its first move
   return solution.sigma_px < as_much * as_given.sigma_px &&
          num_explained_by(solution) + fewer <= num_explained_by(as_given);
 }
 
-/// Frames that were dropped, or are there twice: the images in the rows of their time.
+/// If frames were dropped or repeated, solves again with the images in the rows of their time.
 void heed_places(const ObserveSetup& setup, const Progress& progress, RotationLog& log, ObserveSolution& solution) {
-  if (std::ranges::count(setup.estimate_errors, "clock rate") > 0) return;  // as given: a slow clock looks like gaps
+  if (std::ranges::count(setup.estimate_errors, "clock rate") > 0) return;  // rows stay: a slow clock looks like gaps
   const FramePlaces places = frame_places(log);
   if (places.are_as_given()) return;
   RotationLog moved = placed(log, places);
@@ -109,7 +109,7 @@ void heed_places(const ObserveSetup& setup, const Progress& progress, RotationLo
   log = std::move(moved);
 }
 
-/// Rows of a camera that stands and err alike count once.
+/// If rows in which the camera stands still share their errors, each stop counts once.
 void heed_stops(const ObserveSetup& setup, const Progress& progress, RotationLog& log, ObserveSolution& solution) {
   constexpr double mostly = 0.5, most_own = 0.7;
   constexpr std::size_t fewest = 3;

@@ -22,7 +22,7 @@ void require_sense(const Rig& rig) {
   if (const std::string of_rig = fault(rig); !of_rig.empty()) throw ConfigError(of_rig);
 }
 
-/// What is wrong with an observation; empty where nothing is.
+/// What is invalid in an observation; empty if nothing is.
 std::string observation_fault(const TargetObservation& observation, std::size_t num_heads) {
   if (observation.head >= num_heads)
     return fmt::format("is of head {}, but the rig has {}, counted from 0", observation.head, num_heads);
@@ -73,8 +73,8 @@ TargetMotion motion_of(TrackMethod method) {
   }
 }
 
-/// How long after they were taken observations of a recording come, others having overtaken them: up to 2 s are waited
-/// for, so that the track does not depend on the order of arrival.
+/// The largest delay between capture and arrival of a recording's observations after newer ones had arrived: up to 2 s
+/// are waited for, so that the track does not depend on the order of arrival.
 double lateness_s(const std::vector<TargetObservation>& observations) {
   constexpr double longest_s = 2.0, slack_s = 0.05;
   double newest_s = -std::numeric_limits<double>::infinity(), late_s = 0.0;
@@ -105,7 +105,7 @@ FollowConfig follow_config(const TrackConfig& config, const Rig& rig) {
   return follow;
 }
 
-/// What is assumed of a lens that zooms is not the rig's one number.
+/// Names the assumed intrinsics of a zoom lens after its history, as no single value applies.
 void name_intrinsics_histories(const Rig& rig, std::vector<Assumption>& assumed) {
   for (std::size_t h = 0; h < rig.intrinsics_histories.size(); ++h) {
     if (rig.intrinsics_histories[h].lens.empty()) continue;
@@ -120,7 +120,7 @@ void name_intrinsics_histories(const Rig& rig, std::vector<Assumption>& assumed)
   }
 }
 
-/// The paper's filter tests nothing.
+/// The verdict for the filter of the paper, which has no tests.
 Verdict paper_verdict(const TrackReport& report) {
   Verdict verdict;
   if (report.status == TrackReport::Status::no_start) {
@@ -160,7 +160,7 @@ void heed_doubts(const Rig& rig, Verdict& verdict) {
 }  // namespace
 
 std::string intrinsics_history_fault(const std::vector<TargetObservation>& observations, const Rig& rig) {
-  constexpr double beyond_s = 1.0;  // how long an observer's last estimate is extrapolated
+  constexpr double beyond_s = 1.0;  // how long the last estimate of an observer is extrapolated [s]
   const auto outside = outside_history(observations, rig.intrinsics_histories, beyond_s);
   if (!outside) return "";
   const IntrinsicsHistory& history = rig.intrinsics_histories[outside->head];
@@ -217,7 +217,7 @@ struct TargetTracker::State {
   RecentReadings readings;
   std::vector<TargetObservation> observations;
 
-  /// The angles' delay, as track() counts it.
+  /// Adds the uncertainty by the delay of the angles, as track() does.
   void count_delay(double t_s, Belief<6>& belief) const {
     if (config.sigma_clock_s && *config.sigma_clock_s > 0.0 && std::holds_alternative<Tracker>(tracker))
       readings.count_delay(rig.heads, *config.sigma_clock_s, t_s, belief);

@@ -9,12 +9,12 @@
 #include "alidade/observe/solve/solve.h"
 #include "alidade/turned/turned.h"
 
-// observe() of photos, and of matches between them.
+// observe() for photos and for matches between them.
 
 namespace alidade {
 namespace {
 
-/// Throws ConfigError where something is requested that photos do not determine.
+/// Throws ConfigError if something is requested that photos do not determine.
 ObserveSetup photos_setup(const ObserveConfig& config) {
   ObserveSetup setup = setup_of(config);
   if (setup.rotation == RotationKnowledge::noisy) {
@@ -28,7 +28,7 @@ ObserveSetup photos_setup(const ObserveConfig& config) {
   return setup;
 }
 
-/// External matches are of a camera of which only what is given is known.
+/// `is_ordinary`: aspect ratio and centre are typical. For external matches, only what is given is known of the camera.
 TurnedConfig turned_config(const ObserveSetup& setup, bool is_ordinary) {
   TurnedConfig config;
   config.square_pixels = setup.square_pixels;
@@ -67,7 +67,7 @@ void check_matches(const MatchedPhotos& matches) {
   }
 }
 
-/// A row per photo: its time is its number, its attitude the one estimated from the photos.
+/// Adds one row per photo: its time is its index, its attitude the one estimated from the photos.
 void add_photo_rows(const TurnedReport& solved, ObserveReport& report) {
   report.log.source = RotationSource::attitude;
   report.log.num_points = solved.bundle.rays.size();
@@ -135,11 +135,11 @@ ObserveReport::Status status_of_photos(TurnedReport::Status status) {
                                             : Status::unobservable;
 }
 
-/// `reasons`: why photos take no part from the start; none, or one per photo.
+/// `reasons`: why photos are excluded from the start; empty, or one per photo.
 ObserveReport observe_matches(MatchedPhotos matches, const std::vector<std::string>& reasons, const ObserveSetup& setup,
                               const TurnedConfig& config, const Progress& progress) {
   if (setup.lens_is_given) {
-    const Eigen::Vector2d nowhere(-1e6, -1e6);  // agrees with nothing
+    const Eigen::Vector2d nowhere(-1e6, -1e6);  // matches nothing
     for (auto& features : matches.features) undistort(*setup.camera, nowhere, features);
   }
   TurnedReport solved = observe_turned(matches, config, progress);
@@ -170,7 +170,7 @@ ObserveReport observe_matches(MatchedPhotos matches, const std::vector<std::stri
   return report;
 }
 
-/// Photos of another size than the config says.
+/// The refusal of photos whose size differs from the configured one.
 ObserveReport refused_photo_size(const PhotoMatches& found, const std::pair<int, int>& given) {
   ObserveReport report;
   report.status = ObserveReport::Status::too_few_data;
@@ -217,7 +217,7 @@ ObserveReport observe(MatchedPhotos matches, const ObserveConfig& config, const 
   if (setup.width_px > 0) std::tie(matches.width_px, matches.height_px) = std::pair(setup.width_px, setup.height_px);
   const bool is_guessed = matches.width_px <= 0 || matches.height_px <= 0;
   if (is_guessed) {
-    RotationLog all;  // what holds the features
+    RotationLog all;  // only a container of the features
     for (const auto& features : matches.features) all.rows.push_back({.px = features});
     matches.width_px = matches.height_px = 0;
     (void)pixel_scale(all, matches.width_px, matches.height_px);

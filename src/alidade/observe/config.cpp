@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-/// Of a vector that may be there.
+/// Text code of an optional vector.
 template <int Size>
 TextCode vector_code(std::optional<Eigen::Matrix<double, Size, 1>>& value) {
   return numbers_code(

@@ -58,7 +58,7 @@ void FrameBuffer::thin() {
 
 namespace {
 
-/// Observations and slots for points, one for each generation that was seen. Bearings start at zero.
+/// Observations and slots for points, one per generation that was seen. Bearings are zero.
 RotationBundle bundle_of(const FrameBuffer& buffer, const AdjustConfig& config, std::vector<int>& bundle_point_of) {
   RotationBundle bundle;
   bundle.frames = buffer.frames();
@@ -81,12 +81,12 @@ RotationBundle bundle_of(const FrameBuffer& buffer, const AdjustConfig& config, 
     }
   }
   for (std::size_t i = 0; i < buffer.num_points(); ++i) {
-    if (generation[i] != buffer.current_generation(i)) bundle_point_of[i] = -1;  // what was seen is another point now
+    if (generation[i] != buffer.current_generation(i)) bundle_point_of[i] = -1;  // the current one was not seen yet
   }
   return bundle;
 }
 
-/// Bearings from each point's first pixel, as `camera` would have it; depths from ranges.
+/// Initial bearings from each point's first pixel with `camera`; depths from ranges.
 bool start_points(RotationBundle& bundle, const RotatingCamera& camera, bool with_depth) {
   std::vector<bool> started(bundle.points.size(), false);
   for (const BundleObservation& seen : bundle.observations) {
@@ -103,7 +103,7 @@ bool start_points(RotationBundle& bundle, const RotatingCamera& camera, bool wit
   return true;
 }
 
-/// Rejects observations beyond 6 σ, and points whole of which most are: they move. How many observations.
+/// Rejects observations beyond 6 σ, and all of a point if most of its are: it moves. Returns the number rejected.
 std::size_t reject_far(RotationBundle& bundle, const BundleSolution& solution, double sigma_px) {
   const auto is_far = [&](std::size_t i) { return !(solution.residual_px[i] < 6.0 * sigma_px); };
   std::vector<int> far_minus_near(bundle.points.size(), 0);
@@ -125,19 +125,19 @@ RotatingCamera with_focal(RotatingCamera camera, double focal) {
   return camera;
 }
 
-/// σ of a coordinate by least squares.
+/// σ of a coordinate by least squares (not robust).
 double sigma_by_squares(const BundleSolution& solution) {
   const double count = 2.0 * static_cast<double>(solution.residual_px.size());
   return solution.rms_px * std::sqrt(count / std::max(solution.dof, 1));
 }
 
-/// Wrong pixels keep a solution from converging that the others have reached: it is good enough to reject them by.
+/// Outliers can prevent convergence even though the other pixels fit: the solution is then good enough to reject them.
 bool most_fit(const BundleSolution& solution, double sigma_px) {
   constexpr double ordinary = 2.0;
   return robust_sigma(solution.residual_px, solution.dof) < ordinary * sigma_px;
 }
 
-/// From the solution so far: without what does not belong, then with the noise that the rest shows.
+/// Solves twice more from the solution so far: first without outliers, then with σ from the remaining residuals.
 void solve_again(const AdjustConfig& config, const Progress& progress, RotationBundleConfig& solve,
                  Adjustment& adjustment) {
   RotationBundle& bundle = adjustment.bundle;

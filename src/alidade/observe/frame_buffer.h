@@ -7,15 +7,15 @@
 
 namespace alidade {
 
-/// The last frames, with normalised pixels, in preallocated memory. When it is full every second frame is dropped.
-/// A point that slipped, or was last seen before a gap, continues as a new point.
+/// The last frames, with normalised pixels, in preallocated memory. When it is full, every second frame is dropped.
+/// An outlier point, or one that was last seen before a gap, continues as a new point.
 class FrameBuffer {
  public:
   FrameBuffer(std::size_t num_points, std::size_t capacity);
 
-  /// Adds a frame; `px` normalised, NaN: not seen or not to be used.
+  /// Adds a frame; `px` is normalised; NaN: not seen or not to be used.
   void add(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
-  void renew_point(std::size_t point) { ++generation_[point]; }  ///< From the next frame on it is another point.
+  void renew_point(std::size_t point) { ++generation_[point]; }  ///< From the next frame on it is a new point.
   void renew_all();
   void erase_before(double t_s);
   void clear();
@@ -36,12 +36,12 @@ class FrameBuffer {
   void thin();
 
   std::size_t num_points_, capacity_;
-  std::vector<RotationFrame> frames_;  ///< Without px.
+  std::vector<RotationFrame> frames_;  ///< Without their px.
   std::vector<Eigen::Vector2d> px_;
   std::vector<int> generations_, generation_;
 };
 
-/// A bundle over a buffer.
+/// Options of a bundle adjustment over a buffer.
 struct AdjustConfig {
   ObserveNuisances nuisances;
   bool with_depth = false;
@@ -50,25 +50,25 @@ struct AdjustConfig {
   std::size_t range_point = 0;
   double sigma_rotation_rad = 0.0;
   double sigma_rate_rad_per_s = 0.0;
-  bool reject = true;                ///< Reject what lies beyond 6 σ.
-  std::optional<CommonPrior> prior;  ///< None: a weak one about wherever the answer is.
+  bool reject = true;                ///< Reject observations beyond 6 σ.
+  std::optional<CommonPrior> prior;  ///< None: a weak one, centred on each guess.
   RotatingCamera start;
-  /// fx = fy to try one after the other beside the start's, normalised.
+  /// Further initial guesses of fx = fy beside `start`, normalised, tried one after the other.
   std::vector<double> other_starts;
-  int max_iterations = 60;  ///< From each start: one that is near the answer is there after a dozen.
-  bool gives_up = false;    ///< What does not seem to settle is no answer; for what is compared by its noise alone.
+  int max_iterations = 60;  ///< From each initial guess: a good one converges within a dozen.
+  bool gives_up = false;    ///< Stop if convergence seems unlikely: for comparing solutions by their noise.
 };
 
 struct Adjustment {
   bool has_value = false;
   BundleSolution solution;
   RotationBundle bundle;
-  std::vector<int> bundle_point_of;  ///< Of each of the buffer's points as it is now; −1: none.
-  double sigma_px = 0.0;             ///< Normalised; given, or estimated.
+  std::vector<int> bundle_point_of;  ///< Per current point of the buffer, its index in the bundle; −1: none.
+  double sigma_px = 0.0;             ///< Normalised; given or estimated.
   std::size_t num_rejected = 0;
 };
 
-/// Adjusts all that the buffer holds. No value: fewer measurements than unknowns, or no start leads anywhere.
+/// Adjusts all frames of the buffer. No value: fewer measurements than unknowns, or no initial guess converges.
 [[nodiscard]] Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const Progress& progress = {});
 
 }  // namespace alidade

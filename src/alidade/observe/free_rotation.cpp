@@ -12,7 +12,7 @@ struct RayPair {
   Eigen::Vector3d before, now;
 };
 
-/// Rays of points seen in both rows, for a focal length.
+/// Rays of the points seen in both rows, for an assumed focal length.
 std::vector<RayPair> shared_rays(const RotationRow& before, const RotationRow& now, const PixelScale& scale,
                                  double focal) {
   std::vector<RayPair> pairs;
@@ -26,7 +26,7 @@ std::vector<RayPair> shared_rays(const RotationRow& before, const RotationRow& n
   return pairs;
 }
 
-/// Rotation that takes `before` to `now`, weighted.
+/// Weighted rotation that maps the rays `before` to `now`.
 Eigen::Matrix3d align(const std::vector<RayPair>& pairs, const std::vector<double>& weights) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < pairs.size(); ++i) sum += weights[i] * pairs[i].now * pairs[i].before.transpose();
@@ -38,7 +38,7 @@ struct Alignment {
   double median_angle = 0.0;
 };
 
-/// Robust: from the best of pairs of correspondences (least median), then weights that fall with the residual.
+/// Robust: least median over pairs of correspondences, then iterative reweighting by the residuals.
 Alignment robust_alignment(const std::vector<RayPair>& pairs) {
   std::vector<double> angles(pairs.size()), weights(pairs.size(), 1.0);
   const auto measure = [&](const Eigen::Matrix3d& cam_from_before) {
@@ -67,11 +67,11 @@ Alignment robust_alignment(const std::vector<RayPair>& pairs) {
   return best;
 }
 
-/// For each row the earlier one with which it shares most points, or −1.
+/// For each row, the earlier one with which it shares most points; −1: none.
 std::vector<int> neighbours(const RotationLog& log) {
   std::vector<int> neighbour(log.rows.size(), -1);
   for (std::size_t k = 1; k < log.rows.size(); ++k) {
-    std::size_t most = 2;  // three points and more
+    std::size_t most = 2;  // at least three points
     for (std::size_t back = 1; back <= std::min<std::size_t>(k, 10); ++back) {
       std::size_t shared = 0;
       for (std::size_t i = 0; i < log.num_points; ++i) {
@@ -91,7 +91,7 @@ std::optional<FreeRotationStart> free_rotation_start(const RotationLog& log, con
   const std::vector<int> neighbour = neighbours(log);
   FreeRotationStart best;
   double least = std::numeric_limits<double>::infinity();
-  // Long logs: the focal length from some of the pairs, the rotations from all.
+  // For long logs, the focal length is estimated from some of the pairs, the rotations from all.
   const std::size_t stride = std::max<std::size_t>(1, log.rows.size() / 30);
   for (double focal = 0.4; focal < 20.0; focal *= 1.07) {
     double sum = 0.0;
@@ -99,7 +99,7 @@ std::optional<FreeRotationStart> free_rotation_start(const RotationLog& log, con
     for (std::size_t k = 1; k < log.rows.size(); k += stride) {
       if (neighbour[k] < 0) continue;
       const auto pairs = shared_rays(log.rows[static_cast<std::size_t>(neighbour[k])], log.rows[k], scale, focal);
-      sum += focal * robust_alignment(pairs).median_angle;  // in pixels, so that a long lens is no advantage
+      sum += focal * robust_alignment(pairs).median_angle;  // in pixels, so that a long focal length has no advantage
       ++count;
     }
     if (count == 0) return std::nullopt;

@@ -15,9 +15,9 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t max_points = 50;
-constexpr double shortest_length = 0.33;  // of the way allowed
+constexpr double shortest_length = 0.33;  // share of the allowed range
 
-/// The covariance (normalised) if every pixel erred by itself: with its σ, and correlations as stated.
+/// The covariance (normalised) for independent pixel errors: with the model's σ, and the correlations as stated.
 Eigen::Matrix4d model_covariance(const ObservedNow& now, const Eigen::Matrix4d& cov) {
   if (!(now.sigma_model_px.minCoeff() > 0.0)) return cov;
   const Eigen::Vector4d sigma = now.cov_px2.diagonal().cwiseSqrt();
@@ -85,11 +85,11 @@ class Planner {
         for (const double side : {-1.0, 1.0}) targets.emplace_back(0.0, 0.0, side * limits_.max_turn_rad * length);
       }
     }
-    targets.emplace_back(0.0, 0.0, 0.0);  // back to where it looks now
+    targets.emplace_back(0.0, 0.0, 0.0);  // back to the current direction
     return targets;
   }
 
-  /// Frames on the way from where the head stands to `target`; how long it takes.
+  /// Adds the frames on the way from the current position to `target`; returns the duration [s].
   double travel(const Eigen::Vector3d& target) {
     const Eigen::Vector3d way = target - at_;
     const double duration_s = way.cwiseAbs().maxCoeff() / limits_.rate_rad_per_s;
@@ -108,7 +108,7 @@ class Planner {
       frame.dt_s = 1.0 / limits_.frames_per_s;
       frame.rate_rad_per_s = -log_so3(frame.cam_from_start * before.conjugate()) / frame.dt_s;
     }
-    angles_rad_.resize(bundle_.frames.size());  // of a candidate that was not taken
+    angles_rad_.resize(bundle_.frames.size());  // drops those of a rejected candidate
     angles_rad_.push_back(pan_tilt_roll_rad);
     const RotationView view(bundle_.camera, frame);
     for (std::size_t i = 0; i < bundle_.points.size(); ++i) {
@@ -136,19 +136,19 @@ class Planner {
     return solution;
   }
 
-  /// Normalised.
+  /// σ of a pixel with the design effect, normalised.
   [[nodiscard]] double sigma_px() const {
     return now_.sigma_px * std::sqrt(std::max(1.0, now_.design_effect)) / scale_.scale;
   }
 
-  /// As long as every pixel errs by itself, and all that is given is exact.
+  /// Variance of fx, fy, cx, cy for independent pixel errors and exact given values.
   [[nodiscard]] Eigen::Vector4d variance_px2() const {
     const Eigen::Matrix4d all = solution().information + before_;
     return inverse_symmetric(all).diagonal() * (scale_.scale * scale_.scale);
   }
 
-  /// With what is given: how far its errors move the estimate during the moves, and how far they have moved it in the
-  /// log before, by whatever that still counts for. They are the same errors, so at worst both add up.
+  /// σ including the errors of given values: their effect on the estimate during the moves, and the effect they had in
+  /// the log before, weighted by its remaining share. Both come from the same errors, so in the worst case they add up.
   [[nodiscard]] Eigen::Vector4d stated_sigma_px() const {
     Adjustment moves{.has_value = true, .solution = solution(), .bundle = bundle_, .sigma_px = sigma_px()};
     const Eigen::Matrix4d model = inverse_symmetric(Eigen::Matrix4d(moves.solution.information + before_));
@@ -160,7 +160,7 @@ class Planner {
     return sigma.cwiseMin(now_.cov_px2.diagonal().cwiseSqrt());
   }
 
-  /// The rotations of the frames as they will be measured.
+  /// The rotations of the frames as they would be measured.
   [[nodiscard]] RotationLog log() const {
     RotationLog log{.source = now_.source, .has_roll_rate = true};
     for (std::size_t k = 0; k < bundle_.frames.size(); ++k) {
@@ -178,8 +178,8 @@ class Planner {
   PixelScale scale_;
   RotationBundle bundle_;
   std::vector<Eigen::Vector3d> angles_rad_;                 ///< Pan, tilt, roll of each frame.
-  Eigen::Matrix4d before_ = Eigen::Matrix4d::Zero();        ///< Information of the log before, by its single pixels.
-  Eigen::Matrix4d given_before_ = Eigen::Matrix4d::Zero();  ///< What its σ has beside that.
+  Eigen::Matrix4d before_ = Eigen::Matrix4d::Zero();        ///< Information of the log, for independent errors.
+  Eigen::Matrix4d given_before_ = Eigen::Matrix4d::Zero();  ///< Additional covariance of the log.
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
 };
 
@@ -214,7 +214,7 @@ void assume_estimated(const std::string& quantity, double sigma, std::vector<Ass
 }
 
 double shortest_way_rad(const MoveLimits& limits) {
-  return shortest_length * std::numbers::sqrt2 / 2.0 * limits.max_turn_rad;  // of the longer axis
+  return shortest_length * std::numbers::sqrt2 / 2.0 * limits.max_turn_rad;  // along the longer axis
 }
 
 bool is_short_enough(double way_rad, const MoveLimits& limits) {

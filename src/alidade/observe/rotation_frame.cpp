@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// ∫ω over the last step of length `h`, after one of length `h0`: the parabola through three samples.
+/// ∫ω over the last step of length `h`, after one of length `h0`: from the parabola through three samples.
 Eigen::Vector3d integral(const Eigen::Vector3d& before, const Eigen::Vector3d& last, const Eigen::Vector3d& now,
                          double h0, double h) {
   const double r = h / h0;
@@ -29,7 +29,7 @@ RotationFrame MotionReader::next(const RotationRow& row) {
   const std::optional<Eigen::Quaterniond> attitude = attitude_of(row);
   const bool is_measured = source_ == RotationSource::none ||
                            (source_ == RotationSource::rate ? row.rate_rad_per_s.allFinite() : attitude.has_value());
-  if (!is_measured) return frame;  // without pixels: where it looked is not known
+  if (!is_measured) return frame;  // without pixels, as the orientation is unknown
   frame.range_m = row.range_m;
   frame.px = row.px;
   frame.starts_segment = !has_last_;
@@ -62,7 +62,7 @@ void MotionReader::advance_by_rate(const Eigen::Vector3d& rate, RotationFrame& f
   const double h = frame.dt_s;
   const Eigen::Vector3d turn = has_before_ ? integral(before_rate_, last_rate_, rate, last_dt_s_, h)
                                            : Eigen::Vector3d(0.5 * h * (last_rate_ + rate));
-  // Second term of the Magnus series: R = Exp(−(turn − h²/12 ω₁ × ω₀)).
+  // With the second term of the Magnus series: R = Exp(−(turn − h²/12 ω₁ × ω₀)).
   const Eigen::Vector3d vector = turn - h * h / 12.0 * rate.cross(last_rate_);
   cam_from_start_ = (exp_so3(-vector) * cam_from_start_).normalized();
   frame.mean_rate_rad_per_s = vector / h;
@@ -78,7 +78,7 @@ void MotionReader::advance_by_attitude(const Eigen::Quaterniond& base_from_cam, 
     const Eigen::Quaterniond now_from_last = base_from_cam.conjugate() * last_base_from_cam_;
     cam_from_start_ = (now_from_last * cam_from_start_).normalized();
     if (frame.dt_s > 0.0) frame.mean_rate_rad_per_s = -log_so3(now_from_last.normalized()) / frame.dt_s;
-    // Over a longer gap it may have stood, or turned there and back: nothing says how fast it turns at its ends.
+    // Over a longer gap it may have stopped, or rotated back and forth: the rates at its ends are unknown.
     const bool is_far = frame.dt_s > max_gap_s_;
     if (has_before_ && frame.dt_s > 0.0 && last_dt_s_ > 0.0 && !is_far && last_dt_s_ <= max_gap_s_) {
       const Eigen::Vector3d change = frame.mean_rate_rad_per_s - last_mean_rate_;
@@ -94,7 +94,7 @@ void MotionReader::advance_by_attitude(const Eigen::Quaterniond& base_from_cam, 
   last_base_from_cam_ = base_from_cam;
 }
 
-/// ṁ = −v − ω × m, with v at its mean over the step: what was shifted before rotates with the camera.
+/// ṁ = −v − ω × m, with the mean of v over the step: the earlier shift rotates with the camera.
 void MotionReader::advance_shift(const Eigen::Vector3d& velocity, const RotationFrame& frame) {
   if (frame.starts_segment) {
     cam_from_start_.setIdentity();

@@ -27,7 +27,7 @@ void take_word(const std::string& word, ObserveSetup& setup, Faults& faults) {
   }
 }
 
-/// Words and vectors, by what the same value would be answered on a command line.
+/// Checks words and vectors in the same way as the command line does.
 void check_codes(const FieldList& fields, Faults& faults) {
   for (const Field& field : fields) {
     const auto* code = std::get_if<TextCode>(&field.value);
@@ -42,7 +42,7 @@ std::string camera_fault(const Camera& camera) {
   return is_central(camera.lens) ? fault(camera) : "the camera has no single viewpoint: give a central one";
 }
 
-/// Of a lens with its covariance; none: not given. A lens without k1 is one that a board was calibrated with: 0.
+/// σ of k1 of a lens with covariance; none if not given. A lens without k1 was calibrated with k1 = 0: σ is 0.
 std::optional<double> sigma_of_k1(const Camera& camera) {
   if (camera.cov.size() == 0) return std::nullopt;
   const auto names = param_names(camera.lens);
@@ -59,7 +59,7 @@ void take_camera(const Camera& camera, ObserveSetup& setup) {
   setup.sigma_k1 = sigma_of_k1(camera);
 }
 
-/// Regressions estimate nothing beside the four, by a rotation that is known.
+/// Regressions estimate only fx, fy, cx, cy, from a known rotation.
 void take_method(ObserveSetup& setup, Faults& faults) {
   const bool is_regression = setup.method == ObserveMethod::flow || setup.method == ObserveMethod::fang2011;
   const bool asks = CommonLayout(setup.nuisances).size > 4 || setup.estimate_auto || !setup.estimate_errors.empty();
@@ -82,7 +82,7 @@ void check_numbers(ObserveSetup& setup, Faults& faults) {
 }
 
 bool is_within_reach(const Eigen::Vector2d& px) {
-  constexpr double max_px = 1e6;  // as the reader of files has it
+  constexpr double max_px = 1e6;  // the limit of the file reader
   return !is_seen(px) || px.cwiseAbs().maxCoeff() <= max_px;
 }
 

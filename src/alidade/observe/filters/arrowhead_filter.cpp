@@ -42,7 +42,7 @@ void ArrowheadFilter::start(const BundleSolution& solution, const std::vector<in
   covariance_.setZero(n, n);
   covariance_.topLeftCorner(solved, solved) = solution.covariance();
   precision_ = inverse(covariance_);
-  // Before, a zoom may have given the layout four entries more.
+  // A zoom may have extended the layout by four entries before.
   information_.setZero(n, n);
   gradient_.setZero(n);
   num_seen_ = 0;
@@ -67,14 +67,14 @@ void ArrowheadFilter::remember_intrinsics() {
   if (nuisances_.learnt) return;
   const int n = layout_.size;
   nuisances_.learnt = true;
-  layout_ = CommonLayout(nuisances_);  // its index is the last one: a filter has no turn
+  layout_ = CommonLayout(nuisances_);  // the four new entries come last: a filter estimates no rotation
   const CommonMatrix before = covariance_;
   covariance_.resize(n + 4, n + 4);
   covariance_.topLeftCorner(n, n) = before;
   covariance_.bottomLeftCorner(4, n) = before.topRows<4>();
   covariance_.topRightCorner(n, 4) = before.leftCols<4>();
   covariance_.bottomRightCorner<4, 4>() = before.topLeftCorner<4, 4>();
-  // The copy differs from the original by nothing yet; the walk that follows makes them two.
+  // The copy is identical to the original at first; the process noise that follows separates them.
   covariance_.diagonal().head<4>().array() += 1e-12;
   precision_ = inverse(covariance_);
   for (Point& point : points_) {
@@ -92,8 +92,8 @@ void ArrowheadFilter::remember_intrinsics() {
 void ArrowheadFilter::predict(const CommonVector& variance, double rotation_sigma_rad) {
   const bool turns = layout_.rotation >= 0 && rotation_sigma_rad > 0.0;
   if (!turns && variance.isZero(0.0)) return;
-  // c' = F c + w:  P' = F P Fᵀ + Q,  G = P Fᵀ P'⁻¹;  a point's slope becomes A G, its covariance gains A (P − G P' Gᵀ)
-  // Aᵀ.
+  // c' = F c + w:  P' = F P Fᵀ + Q,  G = P Fᵀ P'⁻¹. The slope A of a point becomes A G, its covariance is increased by
+  // A (P − G P' Gᵀ) Aᵀ.
   const CommonMatrix before = covariance_;
   CommonMatrix kept = before;  // P Fᵀ
   if (turns) {
@@ -185,7 +185,7 @@ ArrowheadFilter::Hypothesis ArrowheadFilter::with_added_variance(const CommonVec
   CommonMatrix walked = covariance_;
   walked.diagonal() += variance;
   CommonMatrix information = inverse(walked);
-  // As in predict(): the points stay where they are, whatever the camera becomes.
+  // As in predict(): the points stay fixed while the camera changes.
   const CommonMatrix gain = covariance_ * information;
   const CommonMatrix lost = covariance_ - gain * walked * gain.transpose();
   const CommonMatrix change = gain - CommonMatrix::Identity(layout_.size, layout_.size);
@@ -272,7 +272,7 @@ void ArrowheadFilter::update() {
   add_new_points(frame_, px_);
 }
 
-/// A point that is met first: its pixel gives a and b for every c, p(c, b) = px, so b's slope is −(∂p/∂b)⁻¹ ∂p/∂c.
+/// A point seen for the first time: for every c its pixel gives a and b by p(c, b) = px; slope: −(∂p/∂b)⁻¹ ∂p/∂c.
 void ArrowheadFilter::add_new_points(const RotationFrame& frame, std::span<const Eigen::Vector2d> px) {
   const RotationView view(camera_, frame);
   RotationPrediction prediction;
@@ -312,7 +312,7 @@ bool ArrowheadFilter::update_range(const RotationFrame& frame, std::size_t i, do
   PointByCommonSlope J_common;
   Eigen::Matrix3d J_point;
   view.point_jacobians(point.bearing, layout_, J_common, J_point);
-  // ln range: nearly linear in the depth's logarithm, however wrong the depth still is.
+  // ln range is nearly linear in the logarithm of the depth, even while the depth is still far off.
   const Eigen::RowVector3d J_d = d.transpose() / d.squaredNorm();
   Eigen::RowVector3d by_point = J_d * J_point;
   by_point[2] -= 1.0 / chi;

@@ -6,33 +6,33 @@
 
 namespace alidade {
 
-/// Extended Kalman filter on "shared parameters c + many static points", with an arrowhead covariance:
-/// given c, the points are independent. Measurement updates keep that form exactly, for a pixel depends on c and its
-/// own point alone, and cost O(points). Process noise on c would tie the points to each other; there the joint normal
-/// is projected on the nearest arrowhead (the one that keeps c with each single point, the minimum of the
-/// Kullback–Leibler divergence). Allocates nothing after construction. Everything is in normalised pixels. Bar-Shalom,
-/// Li & Kirubarajan, "Estimation with applications to tracking and navigation", 2001, section 10.3.
+/// Extended Kalman filter on "shared parameters c + many static points" with an arrowhead covariance: given c, the
+/// points are independent. Measurement updates keep that form exactly, since a pixel depends only on c and its own
+/// point, and cost O(points). Process noise on c would correlate the points with each other; there the joint
+/// normal distribution is projected onto the nearest arrowhead (the one that keeps c with each single point, the
+/// minimum of the Kullback–Leibler divergence). Allocates nothing after construction. All pixels are normalised.
+/// Bar-Shalom, Li & Kirubarajan, "Estimation with applications to tracking and navigation", 2001, section 10.3.
 class ArrowheadFilter {
  public:
   ArrowheadFilter(const ObserveNuisances& nuisances, bool with_depth, std::size_t num_points);
 
-  /// Initialises from a bundle's solution. Other points are added when they are first seen.
+  /// Initialises from the solution of a bundle. Other points are added when they are first seen.
   void start(const BundleSolution& solution, const std::vector<int>& bundle_point_of, double sigma_px);
   void forget_points();  ///< A new segment: points are initialised again, the shared parameters are kept.
   void forget_point(std::size_t i) { points_[i].known = false; }
-  /// From now on this point's pixels have so many times their variance.
+  /// From now on the variance of this point's pixels is multiplied by `factor`.
   void inflate_variance(std::size_t i, double factor) { points_[i].variance_factor = factor; }
 
-  /// Before a zoom: keeps the fx, fy, cx, cy with which the points were estimated as further shared parameters, so that
-  /// the errors that points share through them stay correlated. Once; later calls do nothing.
+  /// Before a zoom: keeps the fx, fy, cx, cy with which the points were estimated as additional shared
+  /// parameters, so that the errors that points share through them stay correlated. Later calls do nothing.
   void remember_intrinsics();
   /// Process noise: adds variances in the layout's order; with `rotation_sigma_rad` > 0 the rotation error is reset.
   void predict(const CommonVector& variance, double rotation_sigma_rad);
-  /// Linearises a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
+  /// Linearises a frame: innovations of all known points that are seen. `px` is normalised; NaN: not seen.
   void observe(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
-  /// The same frame after `predict`: what was rejected stays so.
+  /// The same frame after `predict`: rejected points stay rejected.
   void observe_again(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
-  /// Number of innovations; index `i` below is of this list.
+  /// Number of innovations; the index `i` below refers to this list.
   [[nodiscard]] std::size_t num_seen() const { return num_seen_; }
   [[nodiscard]] int seen_point(std::size_t i) const { return seen_[i].point; }
   void set_rejected(std::size_t i, bool out) {
@@ -50,15 +50,15 @@ class ArrowheadFilter {
     CommonMatrix point_change;  ///< What the points' slopes are multiplied by, less the identity.
   };
   [[nodiscard]] Hypothesis with_added_variance(const CommonVector& variance) const;
-  /// What the step leaves of a point's innovation, squared over its variance.
+  /// Squared innovation of a point after the step of the hypothesis, over its variance.
   [[nodiscard]] double left_over(std::size_t i, const Hypothesis& hypothesis) const;
   /// NIS of one point alone, 2 degrees of freedom.
   [[nodiscard]] double point_nis(std::size_t i) const;
-  /// Adds the score of fx, fy, cx, cy, Gᵀ S⁻¹ ν, and its covariance Gᵀ S⁻¹ G: zero on the mean while nothing changes.
+  /// Adds the score of fx, fy, cx, cy, Gᵀ S⁻¹ ν, and its covariance Gᵀ S⁻¹ G; the mean is zero while nothing changes.
   void add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information);
-  /// One point's contribution to it, with the shared parameters known: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
+  /// Contribution of one point to it, for known shared parameters: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
   void add_point_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const;
-  /// Updates with the innovations that are not rejected, and adds new points. Once after `observe`.
+  /// Updates with all innovations that are not rejected, and adds new points. To be called once after `observe`.
   void update();
   /// Updates with the range of a known point. False: rejected (beyond 4 σ), or the point has no depth.
   bool update_range(const RotationFrame& frame, std::size_t point, double range_m, double sigma_range_m);
@@ -104,10 +104,10 @@ class ArrowheadFilter {
   std::size_t num_seen_ = 0;
   RotationFrame frame_;
   std::span<const Eigen::Vector2d> px_;
-  CommonMatrix information_;  ///< Σ Gᵀ R⁻¹ G of those not rejected.
+  CommonMatrix information_;  ///< Σ Gᵀ R⁻¹ G over innovations that are not rejected.
   CommonVector gradient_;     ///< Σ Gᵀ R⁻¹ ν.
   double squares_ = 0.0;      ///< Σ νᵀ R⁻¹ ν.
-  bool is_summed_ = false;    ///< The three sums are of what is not rejected now.
+  bool is_summed_ = false;    ///< The three sums are up to date with the rejections.
 };
 
 }  // namespace alidade

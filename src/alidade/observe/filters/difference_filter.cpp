@@ -3,7 +3,7 @@
 namespace alidade {
 namespace {
 
-/// Of a position that is not known, in scaled pixels: many images wide.
+/// Variance of an unknown position in squared scaled pixels: many image widths.
 constexpr double diffuse_variance = 100.0;
 
 }  // namespace

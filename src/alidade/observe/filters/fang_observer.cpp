@@ -9,11 +9,11 @@ namespace {
 
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 
-/// Added to a measured Ḡ: directions that nothing excited get a gain that is large, not infinite.
+/// Added to a measured Ḡ, so that directions without excitation get a gain that is large, not infinite.
 constexpr double gramian_floor = 1e-6;
 
-/// Diagonal of Ḡ, median of many sets of four points in an image of 780×582 under the paper's motion. The last two, of
-/// a head at 20° of tilt.
+/// Diagonal of Ḡ, median over many sets of four points in an image of 780×582
+/// under the motion of the paper. The last two are for a head at a tilt of 20°.
 Matrix8 typical_gramian(std::size_t num_points) {
   DifferenceParameters diagonal;
   diagonal << 2.71605e-3, 3.838248e-2, 8.0096e-3, 4.7259e-4, 1.32494e-3, 9.33727e-3, 5.6e-4, 1.1e-3;
@@ -71,7 +71,7 @@ IntrinsicsEstimate FangObserver::step(const RotationFrame& frame) {
   return estimate(has_started_ && !had_started ? ObserveEvent::start : ObserveEvent::none);
 }
 
-/// False: nothing is seen. A new reference means new differences: every point begins again.
+/// Returns false if nothing is seen. A new reference changes all differences: every point is reinitialised.
 bool FangObserver::choose_reference(const RotationFrame& frame) {
   if (has_reference_ && is_seen(frame.px[reference_])) return true;
   has_reference_ = false;
@@ -153,8 +153,8 @@ void FangObserver::filter_kalman(const RotationFrame& frame) {
   kalman_->finish();
 }
 
-/// Puts y and Ω of the step behind one filter, by the trapezoid rule, so that the regression holds as it did: with ẏ =
-/// Ωᵀθ, (y − y_f)/T = Ω_fᵀθ at every step. Pixels alone behind a filter would lag behind ω, and bias.
+/// Filters y and Ω of the step with the same low-pass (trapezoid rule), so that the regression still holds: from ẏ =
+/// Ωᵀθ follows (y − y_f)/T = Ω_fᵀθ at every step. Filtering only the pixels would delay them against ω, and cause bias.
 void FangObserver::low_pass(Point& point, const Eigen::Vector2d& y, double h) const {
   if (!(gains_.lowpass_hz > 0.0)) {
     point.y_mid = 0.5 * (point.unfiltered + y);
@@ -172,7 +172,7 @@ void FangObserver::low_pass(Point& point, const Eigen::Vector2d& y, double h) co
   point.unfiltered = y;
 }
 
-/// (c + h²/4 ΩᵀΓΩ) e_m = y_m − ξ̂ − h/2 Ωᵀθ̂ with c = 1 + h k1/2, one equation a difference, solved through 8×8
+/// (c + h²/4 ΩᵀΓΩ) e_m = y_m − ξ̂ − h/2 Ωᵀθ̂ with c = 1 + h k1/2, one equation per difference, solved as an 8×8 system
 /// (Woodbury): c e_m = r − Ωᵀ(4c/h² Γ⁻¹ + ΩΩᵀ)⁻¹ Ω r.
 void FangObserver::midpoint_step(double h) {
   const double c = 1.0 + 0.5 * h * gains_.k1;

@@ -7,7 +7,7 @@ namespace alidade {
 namespace {
 
 constexpr int max_projection_steps = 3;
-/// Of ten degrees of freedom: not once in a million.
+/// χ² with ten degrees of freedom: by chance less than once in a million.
 constexpr double implausible_chi2 = 50.0;
 
 }  // namespace
@@ -51,7 +51,7 @@ IntrinsicsEstimate FlowFilter::step(const RotationFrame& frame) {
   return estimate(has_value_ && !had_value ? ObserveEvent::start : ObserveEvent::none);
 }
 
-/// Prediction and update of both coordinates. What is left of a coordinate after Θ is one number with variance s.
+/// Prediction and update of both coordinates. Given Θ, the uncertainty of a coordinate is a single variance s.
 void FlowFilter::advance(Point& point, const Eigen::Vector2d& q, const RotationFrame& frame) {
   const bool ends = config_.rates_at_ends;
   FlowRegressor mean = 0.5 * (flow_regressor(point.q, ends ? last_rate_ : frame.mean_rate_rad_per_s) +
@@ -76,7 +76,7 @@ void FlowFilter::restart(Point& point, const Eigen::Vector2d& q) const {
   point.s = variance_;
 }
 
-/// From the frame before; where that does not fit, it may stand in a wrong valley, and Θ̂ itself is tried as well.
+/// Starts at the last estimate; if the result does not fit (perhaps a local minimum), Θ̂ itself is tried as well.
 void FlowFilter::project() {
   const Eigen::Matrix<double, 14, 14> information = theta_.information();
   Projection best = projection_from(k_, information);
@@ -90,12 +90,12 @@ void FlowFilter::project() {
   has_value_ = k_.allFinite() && sigma_k_.allFinite();
 }
 
-/// Gauss–Newton. A focal length at most halves or doubles in a step: the first frames say little.
+/// Gauss–Newton. A focal length changes by at most a factor of 2 per step, as the first frames determine little.
 FlowFilter::Projection FlowFilter::projection_from(const Eigen::Vector4d& start,
                                                    const Eigen::Matrix<double, 14, 14>& information) const {
   Projection at{.k = start};
   Eigen::Matrix<double, 14, 14> weight = information;
-  if (num_columns_ == 10) weight.bottomRows<4>().setZero();  // the ten are independent of the four that were not used
+  if (num_columns_ == 10) weight.bottomRows<4>().setZero();  // the ten are independent of the four unused columns
   Eigen::Matrix4d normal;
   for (int i = 0; i < max_projection_steps; ++i) {
     const Eigen::Matrix<double, 14, 4> j = flow_parameters_jacobian(at.k);

@@ -38,7 +38,7 @@ FocalVariation focal_variation_of(const RotationBundle& bundle, const BundleSolu
 
 namespace {
 
-/// A frame's residuals.
+/// Sums over the residuals of one frame.
 struct FrameSums {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double squares = 0.0;

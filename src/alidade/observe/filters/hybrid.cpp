@@ -9,14 +9,14 @@
 namespace alidade {
 namespace {
 
-constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
-constexpr int slip_patience = 15;   // frames until a point that slipped is met again
+constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: a change of K must explain more than chance does
+constexpr int slip_patience = 15;   // frames until a rejected point is reinitialised
 constexpr double slipped_variance = 25.0;
-constexpr double restart_after_s = 1.0;  // of frames that do not fit; a gap before them is none
+constexpr double restart_after_s = 1.0;  // duration of frames that do not fit; a gap before them does not count
 constexpr double longest_step_s = 0.25;
-constexpr double better_by = 9.2;       // χ²₂ at 0.01
-constexpr int drift_window = 15;        // frames
-constexpr double finer_by = 0.75;       // of σ: what the filter gained since the last adjustment, before the next
+constexpr double better_by = 9.2;  // χ²₂ at 0.01
+constexpr int drift_window = 15;   // frames
+constexpr double finer_by = 0.75;  // of σ: gain of the filter since the last adjustment that triggers the next one
 constexpr int between_adjustments = 5;  // frames
 
 }  // namespace
@@ -59,7 +59,7 @@ IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
   rejected_step_.setZero();
   const bool sees = std::ranges::any_of(px_, is_seen);
   if (is_running_ && sees) filter_frame(frame, estimate);
-  if (is_running_ && !sees && has_fit_) last_fit_s_ = frame.t_s;  // such a frame says nothing of the camera
+  if (is_running_ && !sees && has_fit_) last_fit_s_ = frame.t_s;  // such a frame contains no information on the camera
   if (!is_running_ && sees) bootstrap(frame, estimate);
   if (is_running_) report(frame.t_s, estimate);
   return estimate;
@@ -68,7 +68,7 @@ IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
 void HybridObserver::bootstrap(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
   if (buffer_.size() == 0) next_adjustment_s_ = frame.t_s + config_.bootstrap_s;
   buffer_.add(frame, px_);
-  // A frame at 1 s is due, whatever the rounding of its time.
+  // A frame at 1 s is due in spite of rounding errors of its time.
   if (frame.t_s < next_adjustment_s_ - 1e-6) return;
   next_adjustment_s_ = frame.t_s + 0.5 * config_.bootstrap_s;
   if (!adjust_buffer()) return;
@@ -91,12 +91,12 @@ bool HybridObserver::adjust_buffer() {
   if (!config_.start_is_given && !is_running_) config.other_starts = {0.7, 1.3, 2.5, 5.0, 10.0};
   Adjustment adjustment = adjust(buffer_, config);
   if (!adjustment.has_value && !is_running_ && config_.start_is_given) {
-    config.other_starts = {0.7, 1.3, 2.5, 5.0, 10.0};  // the given start may be far off
+    config.other_starts = {0.7, 1.3, 2.5, 5.0, 10.0};  // the given initial guess may be far off
     adjustment = adjust(buffer_, config);
   }
   if (!adjustment.has_value) return false;
   if (!is_running_ && focal_variation_of(adjustment.bundle, adjustment.solution).is_significant()) {
-    buffer_.erase_before(buffer_.frames().back().t_s - config_.bootstrap_s);  // wait for a second at rest
+    buffer_.erase_before(buffer_.frames().back().t_s - config_.bootstrap_s);  // waits for a second without zoom
     return false;
   }
   sigma_px_ = adjustment.sigma_px;
@@ -119,25 +119,25 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
   filter_.observe(frame, px_);
   Judgement judgement = judge();
   if (judgement.event == ObserveEvent::burst && is_coarse_) {
-    // What the filter knows is not exact yet: let all frames together say what this one means.
+    // The filter's linearisation is not accurate yet: all frames are adjusted together to judge this one.
     buffer_.add(frame, px_);
     if (adjust_buffer()) filter_.observe(frame, px_);
     judgement = judge();
     judgement.accept = judgement.is_adjusted = true;
-    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.set_rejected(i, true);  // they are in already
+    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.set_rejected(i, true);  // adjusted already
   }
   if (judgement.event == ObserveEvent::burst && !config_.no_zoom && is_zoom(frame)) {
     judgement.event = ObserveEvent::zoom;
     judgement.accept = true;
   }
-  if (!std::isfinite(judgement.nis)) return restart(estimate);  // a σ too small for floating point
+  if (!std::isfinite(judgement.nis)) return restart(estimate);  // σ too small for floating point
   estimate.nis = judgement.nis;
   estimate.nis_dof = judgement.dof;
   estimate.point = judgement.point;
   if (estimate.event == ObserveEvent::none) estimate.event = judgement.event;
   note_fit(frame.t_s, judgement.accept);
   if (!judgement.accept) {
-    // An outlier, or the first frame of another camera: the next one will tell.
+    // An outlier frame, or the first frame after a change of the camera: the next frame decides.
     const CommonVector step = filter_.with_added_variance(process_noise(filter_, any_zoom)).step;
     if (!config_.no_zoom && step.allFinite()) rejected_step_ = step.head<4>();
     if (frame.t_s - unfit_since_s_ > restart_after_s) restart(estimate);
@@ -165,8 +165,8 @@ void HybridObserver::note_fit(double t_s, bool fits) {
   has_fit_ = fits;
 }
 
-/// The intrinsics' scores of some frames together: a slow change that no single frame shows. Where leaving one point
-/// out explains it, that point is not what it was.
+/// Tests the sum of the scores of the intrinsics over some frames, for a slow change that no single frame
+/// reveals. If the change is explained by excluding one point, that point has moved and is reinitialised.
 bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   if (drift_frames_ == 0) {
     drift_from_s_ = last_fit_s_;
@@ -198,7 +198,7 @@ bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   return false;
 }
 
-/// The point without which the window's scores are no more than chance; −1: none.
+/// The point without which the scores of the window are within chance; −1: none.
 int HybridObserver::drifting_point() const {
   Score all;
   for (const Score& own : point_drift_) {
@@ -222,7 +222,7 @@ int HybridObserver::drifting_point() const {
 
 void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgement) {
   last_fit_s_ = frame.t_s;
-  if (judgement.is_adjusted) return;  // its points did not slip, and the buffer has it
+  if (judgement.is_adjusted) return;  // no outlier points, and it is in the buffer already
   if (!is_zooming_) {
     sum_nis_ += judgement.nis;
     sum_dof_ += judgement.dof;
@@ -239,8 +239,8 @@ void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgem
   adjust_buffer();
 }
 
-/// While it is coarse the filter takes some of its own errors of linearisation for knowledge: what it has gained is
-/// checked by adjusting, before it is much.
+/// While it is coarse, the filter underestimates its covariance through errors of
+/// linearisation: its gain of information is checked by an adjustment before it becomes large.
 bool HybridObserver::has_gained_much() {
   if (++frames_since_adjustment_ < between_adjustments) return false;
   const Eigen::Vector2d variance = filter_.covariance().diagonal().head<2>();
@@ -259,10 +259,10 @@ void HybridObserver::note_slips() {
   }
 }
 
-/// The point is met again; if it slips again, later and later.
+/// The point is reinitialised as a new one; if it is rejected again, after ever longer intervals.
 void HybridObserver::reinitialise(std::size_t point) {
   filter_.forget_point(point);
-  filter_.inflate_variance(point, slipped_variance);  // what slipped once may not stand still now either
+  filter_.inflate_variance(point, slipped_variance);  // an outlier point may be moving still
   buffer_.renew_point(point);
   frames_out_[point] = 0;
   patience_[point] = std::min(4 * patience_[point], 10000);
@@ -306,7 +306,7 @@ HybridObserver::Judgement HybridObserver::judge() {
   if (judgement.nis <= chi2_quantile(judgement.dof, gate_z)) return judgement;
   const double if_zoomed = filter_.with_added_variance(process_noise(filter_, any_zoom)).nis;
   if (reject_until(gate_z, judgement)) {
-    // A change of the intrinsics moves all points, some little: it is no slip where it explains clearly more.
+    // A change of the intrinsics moves all points, some slightly: if it explains much more, no point is an outlier.
     if (!(judgement.nis - if_zoomed > better_by)) return judgement;
     for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.set_rejected(i, false);
     judgement.point = -1;
@@ -316,8 +316,8 @@ HybridObserver::Judgement HybridObserver::judge() {
   return judgement;
 }
 
-/// Rejects the worst points one by one until the rest fits: a slip. At most a third of them (one of three or four).
-/// False, with none rejected: that is not it.
+/// Rejects the worst points one by one until the rest fits (outlier points): at most a third of them,
+/// or one of three or four. Returns false, with none rejected, if that does not explain the frame.
 bool HybridObserver::reject_until(double z, Judgement& judgement) {
   const std::size_t seen = filter_.num_seen();
   const std::size_t most = seen < 3 ? 0 : std::max<std::size_t>(seen / 3, 1);
@@ -326,7 +326,7 @@ bool HybridObserver::reject_until(double z, Judgement& judgement) {
     double best = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < seen; ++i) {
       if (filter_.is_rejected(i)) continue;
-      double without = -filter_.point_nis(i);  // many points: the one that fits worst by itself
+      double without = -filter_.point_nis(i);  // many points: instead, the one with the largest NIS of its own
       if (seen <= 12) {
         filter_.set_rejected(i, true);
         without = filter_.nis();

@@ -10,26 +10,26 @@ struct HybridConfig {
   PixelScale scale;
   ObserveNuisances nuisances;
   bool with_depth = false;
-  RotatingCamera start;  ///< Normalised.
+  RotatingCamera start;  ///< Initial guess, normalised.
   std::optional<CommonPrior> prior;
-  bool no_zoom = false;         ///< Nothing is taken for a zoom.
+  bool no_zoom = false;         ///< No change is interpreted as a zoom.
   bool start_is_given = false;  ///< Otherwise several focal lengths are tried.
   double sigma_px = 0.0;        ///< [px]; 0: estimated from the residuals.
-  double sigma_range_m = 0.0;   ///< Of the frames' ranges.
+  double sigma_range_m = 0.0;   ///< Of the ranges in the frames.
   std::size_t range_point = 0;
   double bootstrap_s = 1.0;
-  std::size_t buffer_frames = 300;  ///< Kept for adjustments.
-  /// σ_f / f below which frames are filtered, and a zoom followed, instead of all being adjusted together again.
+  std::size_t buffer_frames = 300;  ///< Number of frames kept for adjustments.
+  /// σ_f / f below which frames are filtered, and a zoom is followed, instead of adjusting all frames again.
   double fine_enough = 1e-3;
-  double zoom_px = 0.5;  ///< σ that a frame of zoom adds to each of fx, fy, cx, cy. [px]
+  double zoom_px = 0.5;  ///< σ that one frame of zoom adds to each of fx, fy, cx, cy [px].
 };
 
-/// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
-/// while the answer is still coarse, then an extended Kalman filter (ArrowheadFilter) that tests each frame before its
-/// update: an outlier point is rejected (and after 15 frames reinitialised), an outlier frame is skipped, a change of
-/// the intrinsics is followed, however fast. It does not start while the focal length varies.
-/// If nothing fits for a second it is reinitialised. `step` allocates nothing once the adjustments are over (about 4
-/// s). docs/maths/rotating-camera.md.
+/// The default estimator for a rotating camera: a rotation bundle adjustment over the first second,
+/// repeated while the result is still coarse, then an extended Kalman filter (ArrowheadFilter) that
+/// tests each frame before its update: an outlier point is rejected (and after 15 frames
+/// reinitialised), an outlier frame is skipped, a change of the intrinsics is followed, however fast.
+/// It does not start while the focal length varies. If nothing fits for a second, it is reinitialised.
+/// `step` allocates nothing after the adjustments are over (about 4 s). docs/maths/rotating-camera.md.
 class HybridObserver {
  public:
   explicit HybridObserver(const HybridConfig& config);
@@ -38,7 +38,7 @@ class HybridObserver {
 
   [[nodiscard]] const ArrowheadFilter& filter() const { return filter_; }
   [[nodiscard]] bool is_running() const { return is_running_; }
-  /// σ of a pixel coordinate: given, or as the log determines so far. [px]
+  /// σ of a pixel coordinate [px]: given, or estimated from the log so far.
   [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
   /// The σ assumed by the filter, normalised: its covariance is in units of it.
   [[nodiscard]] double filter_sigma_px() const { return sigma_px_; }
@@ -49,11 +49,11 @@ class HybridObserver {
     [[nodiscard]] double duration_s() const { return until_s - from_s; }
     [[nodiscard]] bool contains(double t_s) const { return t_s >= from_s - 1e-9 && t_s <= until_s + 1e-9; }
   };
-  /// The longest so far; of zero length while there is none.
+  /// The longest so far; of zero length if there is none.
   [[nodiscard]] ConstantSpan longest_constant_span() const;
-  /// All, in the order of time; of more than a few dozen the longest.
+  /// All spans in temporal order; if there are more than a few dozen, the longest ones.
   [[nodiscard]] std::vector<ConstantSpan> constant_spans() const;
-  /// At the end of the log: where the estimate is still coarse, adjusts all frames together.
+  /// To be called at the end of the log: if the estimate is still coarse, adjusts all frames together.
   void settle();
 
  private:
@@ -63,7 +63,7 @@ class HybridObserver {
     double nis = 0.0;
     int dof = 0;
     bool accept = true;
-    bool is_adjusted = false;  ///< The frame is in the filter by an adjustment of all.
+    bool is_adjusted = false;  ///< The frame is included in the filter by an adjustment of all frames.
   };
 
   void normalise(const RotationFrame& frame);
@@ -98,38 +98,38 @@ class HybridObserver {
   void report(double t_s, IntrinsicsEstimate& estimate) const;
 
   static constexpr double gate_z = 3.09;   ///< One good frame in a thousand is rejected.
-  static constexpr double any_zoom = 1e6;  ///< So many frames of zoom at once: hardly a prior on the intrinsics.
+  static constexpr double any_zoom = 1e6;  ///< Frames of zoom added at once: hardly a prior on the intrinsics.
   static constexpr std::size_t max_spans = 32;
-  static constexpr int settled_frames = 10;  ///< Without change over so many frames a zoom has ended.
+  static constexpr int settled_frames = 10;  ///< A zoom has ended after this many frames without change.
 
   HybridConfig config_;
   ArrowheadFilter filter_;
   FrameBuffer buffer_;
   std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
-  std::vector<int> frames_out_;      ///< One per point: in a row rejected,
-  std::vector<int> patience_;        ///< and how many before it is initialised again.
-  ArrowheadFilter candidate_;        ///< The filter if the last frame was a zoom.
+  std::vector<int> frames_out_;      ///< One per point: number of consecutive frames in which it was rejected,
+  std::vector<int> patience_;        ///< and the number after which it is reinitialised.
+  ArrowheadFilter candidate_;        ///< The filter under the hypothesis that the last frame was a zoom.
   bool has_candidate_ = false;
-  ArrowheadFilter window_start_, last_window_start_;  ///< The filter when the drift's window began, and the one before.
+  ArrowheadFilter window_start_, last_window_start_;  ///< Filter at the start of this drift window and the last.
   bool has_window_starts_ = false;
   std::vector<bool> is_out_;  ///< One per point: rejected in this frame.
-  bool is_coarse_ = true;     ///< Still adjusted, not only filtered.
+  bool is_coarse_ = true;     ///< The frames are still adjusted, not only filtered.
   bool is_running_ = false;
   double sigma_px_ = 0.0;  ///< Normalised.
   double next_adjustment_s_ = 0.0;
   double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
-  bool has_fit_ = true;         ///< The last frame with pixels; otherwise none has
-  double unfit_since_s_ = 0.0;  ///< since then.
-  double drift_from_s_ = 0.0;  ///< The last frame before those whose scores are being added: a zoom may begin after it.
-  Eigen::Vector4d rejected_step_ = Eigen::Vector4d::Zero();  ///< Of fx, fy, cx, cy, as a rejected frame asks for it.
-  std::vector<ConstantSpan> constant_spans_;                 ///< Before the intrinsics last changed.
-  Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, by the last adjustment.
+  bool has_fit_ = true;         ///< Whether the last frame with pixels fitted;
+  double unfit_since_s_ = 0.0;  ///< if not, the time since which none has.
+  double drift_from_s_ = 0.0;   ///< Last frame before the current score window: a zoom may begin after it.
+  Eigen::Vector4d rejected_step_ = Eigen::Vector4d::Zero();      ///< Of fx, fy, cx, cy, from a rejected frame.
+  std::vector<ConstantSpan> constant_spans_;                     ///< Before the last change of the intrinsics.
+  Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, after the last adjustment.
   int frames_since_adjustment_ = 0;
-  double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.
+  double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over the frames that fit: estimates the noise.
   bool is_zooming_ = false;
-  Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();  ///< Of a frame's change while zooming, as it was of late.
-  int frames_to_settle_ = 0;                                 ///< After a zoom has ended it may still go on, slowly,
-  Eigen::Vector4d settling_variance_ = Eigen::Vector4d::Zero();  ///< by so much a frame.
+  Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();      ///< Of the change per frame in a zoom, recently.
+  int frames_to_settle_ = 0;                                     ///< After its end, a zoom may still go on slowly,
+  Eigen::Vector4d settling_variance_ = Eigen::Vector4d::Zero();  ///< with this variance per frame.
   std::array<Eigen::Vector4d, settled_frames> past_k_;
   int past_count_ = 0;
   struct Score {

@@ -1,4 +1,4 @@
-// How the hybrid observer distinguishes a zoom from noise, follows it, and sees that it is over.
+// How the hybrid observer distinguishes a zoom from noise, follows it, and detects its end.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -9,12 +9,12 @@
 namespace alidade {
 namespace {
 
-constexpr int clearly_left = 6;      // degrees of freedom that a burst cannot fit by chance
-constexpr double zoom_memory = 0.8;  // of a frame's change for the next frame's
+constexpr int clearly_left = 6;      // degrees of freedom: an outlier frame cannot fit so many by chance
+constexpr double zoom_memory = 0.8;  // weight of the past in the variance of the change per frame
 
 }  // namespace
 
-/// Variance that so many frames of zoom add.
+/// Variance that `frames` frames of zoom add to the shared parameters.
 CommonVector HybridObserver::process_noise(const ArrowheadFilter& filter, double frames) const {
   CommonVector variance = CommonVector::Zero(filter.layout().size);
   const double sigma = config_.zoom_px / config_.scale.scale;
@@ -22,7 +22,7 @@ CommonVector HybridObserver::process_noise(const ArrowheadFilter& filter, double
   return variance;
 }
 
-/// The same for the frame to come, as fast as the zoom was of late.
+/// The same for the next frame, at the recent speed of the zoom.
 CommonVector HybridObserver::zoom_process_noise() const {
   CommonVector variance = process_noise(filter_, 1.0);
   variance.head<4>() = variance.head<4>().cwiseMax(zoom_variance_);
@@ -34,8 +34,8 @@ void HybridObserver::learn_zoom_process_noise(const Eigen::Vector4d& k_before) {
   zoom_variance_ = zoom_memory * zoom_variance_ + (1.0 - zoom_memory) * step.cwiseAbs2();
 }
 
-/// A frame that does not fit: would it fit another camera? Two frames in a row must want the same one, or each one of
-/// its own, so exactly that chance does not do it; during a zoom one frame will do.
+/// Whether a frame that does not fit would fit another camera. Outside a zoom, two consecutive frames must fit the same
+/// camera, or each one of its own too well for chance; during a zoom one frame suffices.
 bool HybridObserver::is_zoom(const RotationFrame& frame) {
   const bool fits_another = reject_until_zoomed();
   const bool fits_clearly = fits_another && filter_.dof() - 4 >= clearly_left;
@@ -43,7 +43,7 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
     candidate_.predict(process_noise(candidate_, 1.0), 0.0);
     candidate_.observe(frame, px_);
     if (candidate_.dof() > 0 && candidate_.nis() <= chi2_quantile(candidate_.dof(), gate_z)) {
-      filter_ = candidate_;  // and this frame is about to be taken in
+      filter_ = candidate_;  // the caller updates it with this frame
       begin_zoom();
       return true;
     }
@@ -65,8 +65,8 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
   return false;
 }
 
-/// Rejects the points that fit another camera worst, one by one, until the rest fits it: at most a fifth, as all points
-/// of an outlier frame fit none. False, with none rejected: no other camera.
+/// Rejects the points that fit another camera worst, one by one, until the rest fits it: at most a fifth, as in an
+/// outlier frame no points fit. Returns false, with none rejected, if there is no other camera.
 bool HybridObserver::reject_until_zoomed() {
   const std::size_t seen = filter_.num_seen(), most = seen / 5;
   for (std::size_t out = 0;; ++out) {
@@ -87,15 +87,15 @@ bool HybridObserver::reject_until_zoomed() {
   return false;
 }
 
-/// Is the change no more than twice what one frame shows? It may have been smaller in frames before, and is in the
-/// filter's points, then.
+/// Whether the change is at most twice what a single frame reveals. Then it may have
+/// been smaller in earlier frames, and affected the points of the filter already.
 bool HybridObserver::is_noticed_late() {
   const double shown = chi2_quantile(filter_.dof(), gate_z) - filter_.dof();
   return filter_.nis() - filter_.with_added_variance(process_noise(filter_, any_zoom)).nis < 4.0 * shown;
 }
 
-/// To the filter of a window and more ago, with this frame observed: what the frames since then taught it was of a
-/// camera that was changing already.
+/// Returns to the filter as it was at least one window ago, with this frame
+/// observed: the later frames updated it with a camera that was changing already.
 void HybridObserver::go_back(ArrowheadFilter& filter, const RotationFrame& frame) {
   if (!has_window_starts_) return;
   is_out_.assign(is_out_.size(), false);
@@ -107,8 +107,8 @@ void HybridObserver::go_back(ArrowheadFilter& filter, const RotationFrame& frame
     filter.set_rejected(i, is_out_[static_cast<std::size_t>(filter.seen_point(i))]);
 }
 
-/// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
-/// make a drift of 1 px as noisy as one frame is.
+/// Lets the intrinsics change as far as this frame requires, and no farther: process noise for a step of 70 px would
+/// make a drift of 1 px as noisy as a single frame.
 void HybridObserver::jump(ArrowheadFilter& filter, const RotationFrame& frame) const {
   const CommonVector step = filter.with_added_variance(process_noise(filter, any_zoom)).step;
   filter.remember_intrinsics();
@@ -127,11 +127,11 @@ void HybridObserver::begin_zoom() {
   }
   is_zooming_ = true;
   drift_frames_ = 0;
-  is_coarse_ = false;  // frames before are of another camera, and the points are known already
+  is_coarse_ = false;  // earlier frames are of another camera, and the points are known already
   buffer_.clear();
 }
 
-/// The last frames' estimates differ by no more than their noise.
+/// Whether the estimates of the last frames differ by no more than their noise.
 bool HybridObserver::has_zoom_ended() {
   const Eigen::Vector4d now = filter_.camera().k;
   const Eigen::Vector4d before = past_k_[static_cast<std::size_t>(past_count_ % settled_frames)];
@@ -141,12 +141,12 @@ bool HybridObserver::has_zoom_ended() {
   return ((now - before).cwiseAbs().array() < unseen_change().array()).all();
 }
 
-/// What the settled frames' estimates may differ by if all of it is noise.
+/// Largest difference of the settled frames' estimates that noise alone can explain.
 Eigen::Vector4d HybridObserver::unseen_change() const {
   return 3.0 * std::sqrt(2.0) * filter_.covariance().diagonal().head<4>().cwiseSqrt();
 }
 
-/// A zoom so slow that it passed for one that had ended is followed for as long again.
+/// A zoom may be so slow that it seems to have ended: changes are followed for twice as many frames more.
 void HybridObserver::begin_settling() {
   frames_to_settle_ = 2 * settled_frames;
   settling_variance_ = (unseen_change() / settled_frames).cwiseAbs2();
@@ -160,7 +160,7 @@ void HybridObserver::settle_on(double t_s) {
   filter_.predict(variance, 0.0);
 }
 
-/// The intrinsics were constant until now, or until the frames that showed, together, that they are not.
+/// The intrinsics were constant until now, or until the frames that jointly showed a change.
 void HybridObserver::note_constant_span() {
   const ConstantSpan span{constant_since_s_, std::max(constant_since_s_, std::min(last_fit_s_, drift_from_s_))};
   if (constant_spans_.size() == max_spans)
@@ -170,7 +170,7 @@ void HybridObserver::note_constant_span() {
 
 HybridObserver::ConstantSpan HybridObserver::longest_constant_span() const {
   const std::vector<ConstantSpan> spans = constant_spans();
-  // Of equally long ones the last.
+  // Among spans of equal length, the last.
   const auto longest = std::max_element(spans.rbegin(), spans.rend(), [](const ConstantSpan& a, const ConstantSpan& b) {
     return a.duration_s() < b.duration_s();
   });

@@ -4,9 +4,9 @@
 
 namespace alidade {
 
-/// What is known of unknown constants x that every measurement sees linearly, z = βᵀx + noise of variance s: the
-/// estimate and the inverse of its covariance. One frame is begin(), add() for each scalar, finish(). Scalars of one
-/// frame may depend on each other where each comes with its variance given those before it. Allocates nothing.
+/// Information on unknown constants x from linear measurements, z = βᵀx + noise of variance s: the estimate
+/// and the inverse of its covariance. One frame consists of begin(), add() for each scalar, finish(). Scalars
+/// of one frame may be correlated if each comes with its variance given those before it. Allocates nothing.
 template <int n>
 class LinearInformation {
  public:
@@ -40,14 +40,14 @@ class LinearInformation {
   }
 
   [[nodiscard]] const Vector& mean() const { return mean_; }
-  /// Whole, not one triangle of it.
+  /// The full matrix, not only one triangle.
   [[nodiscard]] Matrix information() const { return information_.template selfadjointView<Eigen::Lower>(); }
-  /// J Σ Jᵀ's diagonal; after finish().
+  /// Diagonal of J Σ Jᵀ; valid after finish().
   template <int m>
   [[nodiscard]] Eigen::Matrix<double, m, 1> variances(const Eigen::Matrix<double, m, n>& j) const {
     return (j * factor_.solve(j.transpose())).diagonal();
   }
-  /// Normalised innovation squared of the frame, and how many scalars it had.
+  /// Normalised innovation squared of the frame, and its number of scalars.
   [[nodiscard]] double nis() const { return chi2_; }
   [[nodiscard]] int num_scalars() const { return num_scalars_; }
 

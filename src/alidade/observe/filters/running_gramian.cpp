@@ -19,14 +19,14 @@ void RunningGramian::add(const Matrix& omega_omega_t, double dt_s) {
     newest_s_ -= bin_s;
     bins_[newest_].setZero();
   }
-  newest_s_ = std::min(newest_s_, bin_s);  // after a step longer than all of them
+  newest_s_ = std::min(newest_s_, bin_s);  // after a step longer than all bins
 }
 
 double RunningGramian::lambda_min() const {
   Matrix sum = Matrix::Zero();
   for (const Matrix& bin : bins_) sum += bin;
   Eigen::Matrix<double, 6, 6> reduced = sum.topLeftCorner<6, 6>();
-  for (Eigen::Index i = 6; i < 8; ++i) {  // the two do not mix: one is of x alone, the other of y
+  for (Eigen::Index i = 6; i < 8; ++i) {  // the two are uncoupled: one acts on x, the other on y
     if (sum(i, i) > 0.0) reduced -= sum.block<6, 1>(0, i) * sum.block<1, 6>(i, 0) / sum(i, i);
   }
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(reduced, Eigen::EigenvaluesOnly);

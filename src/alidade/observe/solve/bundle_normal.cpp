@@ -5,7 +5,7 @@
 namespace alidade {
 namespace {
 
-constexpr double unbound = 1e-9;  // a point that no observation binds stays where it is
+constexpr double unbound = 1e-9;  // a point without observations stays fixed
 
 Eigen::Matrix3d inverse_of_frame(const NormalBlock& frame, double damping) {
   Eigen::Matrix3d information = frame.information;
@@ -13,9 +13,9 @@ Eigen::Matrix3d inverse_of_frame(const NormalBlock& frame, double damping) {
   return information.inverse();
 }
 
-/// What stays when one kind of block is eliminated: the shared parameters, then three for each of the other kind.
+/// The system reduced by one kind of block: shared parameters, then three rows per block of the other kind.
 struct Reduced {
-  Eigen::MatrixXd information;  ///< Its lower triangle.
+  Eigen::MatrixXd information;  ///< Lower triangle only.
   Eigen::VectorXd gradient;
 };
 
@@ -35,7 +35,7 @@ Reduced with_blocks(const BundleNormal& normal, const std::vector<NormalBlock>& 
   return reduced;
 }
 
-/// One block's share: S −= Bᵀ P⁻¹ B over the shared parameters and the kept blocks that it crosses.
+/// Contribution of one block: S −= Bᵀ P⁻¹ B over the shared parameters and the kept blocks that it crosses.
 class Elimination {
  public:
   Elimination(const NormalBlock& block, const Eigen::Matrix3d& inverse, Eigen::Index n, Reduced& reduced)
@@ -68,7 +68,7 @@ class Elimination {
   std::vector<std::pair<Eigen::Index, Eigen::Matrix3d>> crossed_;
 };
 
-/// Crossings of each point, frame by frame.
+/// The crossings of each point, in the order of frames.
 std::vector<std::vector<const PointFrameBlock*>> crossings_by_point(const BundleNormal& normal) {
   std::vector<std::vector<const PointFrameBlock*>> by_point(normal.points.size());
   for (const PointFrameBlock& crossing : normal.crossings)
@@ -76,7 +76,7 @@ std::vector<std::vector<const PointFrameBlock*>> crossings_by_point(const Bundle
   return by_point;
 }
 
-/// Couples each rotation that walks with the one before.
+/// Couples each rotation of a random walk with the one before.
 void add_walk(const BundleNormal& normal, Reduced& reduced) {
   const Eigen::Index n = normal.common.rows();
   for (Eigen::Index k = 1; k < std::ssize(normal.walk); ++k)
@@ -115,7 +115,7 @@ bool eliminates_frames(const BundleNormal& normal) {
   return normal.frames_are_measured && normal.frames.size() > normal.points.size();
 }
 
-/// Back-substitution: `gone` comes as what the shared parameters leave of the eliminated blocks' equations, 3 × any.
+/// Back-substitution. Input `gone`: the eliminated blocks' equations after the shared parameters are inserted, 3 × any.
 template <typename Matrix>
 void follow_kept(const BundleNormal& normal, double damping, const std::vector<Matrix>& kept,
                  std::vector<Matrix>& gone) {

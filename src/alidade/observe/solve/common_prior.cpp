@@ -26,7 +26,7 @@ CommonMatrix CommonPrior::information(const CommonLayout& layout) const {
   if (layout.shutter >= 0) sigma[layout.shutter] = sigma_shutter_s;
   if (layout.drift >= 0) sigma[layout.drift] = sigma_drift_per_s;
   if (layout.errors >= 0) {
-    // What encoders and gyroscopes can do is known, and said below.
+    // The accuracy of encoders and gyroscopes is known, and entered below.
     sigma.segment(layout.errors, layout.num_errors).setConstant(std::numeric_limits<double>::infinity());
   }
   CommonMatrix information = CommonMatrix::Zero(layout.size, layout.size);
@@ -56,7 +56,7 @@ CommonPrior CommonPrior::about(const RotatingCamera& camera) const {
   for (int i = 0; i < 4; ++i) {
     if (is_given_k[static_cast<std::size_t>(i)]) moved.mean.k[i] = mean.k[i];
   }
-  // A said aspect is one of the difference: its mean must keep it.
+  // A given aspect ratio is a prior of fx − fy with mean zero: fx and fy of the mean must be equal.
   if (std::isfinite(sigma_aspect) && !is_given_k[0] && !is_given_k[1]) {
     moved.mean.k.head<2>().setConstant(0.5 * (camera.k[0] + camera.k[1]));
   }
@@ -79,7 +79,7 @@ CommonVector CommonPrior::offset(const CommonLayout& layout, const RotatingCamer
   if (layout.lever >= 0) offset.segment<3>(layout.lever) = camera.lever_m - mean.lever_m;
   if (layout.shutter >= 0) offset[layout.shutter] = camera.shutter_s - mean.shutter_s;
   if (layout.drift >= 0) offset[layout.drift] = camera.drift_per_s - mean.drift_per_s;
-  // About none, whatever the mean: all there is of them.
+  // Errors of the rotation have a prior mean of zero in total, including the part that was corrected before.
   for (const RotationErrors* part : {&camera.errors, &camera.undone}) {
     if (layout.errors >= 0 && part->size() == layout.num_errors) {
       offset.segment(layout.errors, layout.num_errors) += *part;

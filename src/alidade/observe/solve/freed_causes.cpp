@@ -25,7 +25,7 @@ bool free_cause(const std::string& cause, const RotationLog& log, ObserveSetup& 
     if (is_of_lens && lens_is_given) return false;
     if (const auto nuisance = nuisance_of(estimate_word_of(name))) estimate.*nuisance = true;
   }
-  // Higher terms without the lower ones are no lens that is made.
+  // No real lens has higher terms without the lower ones.
   estimate.k2 = estimate.k2 || (estimate.k3 && !lens_is_given);
   estimate.k1 = estimate.k1 || (estimate.k2 && !lens_is_given);
   return CommonLayout(estimate).size > CommonLayout(before).size;
@@ -48,9 +48,9 @@ const CauseScore* best_cause(const ObserveSolution& report, bool is_no_lever) {
 }
 
 bool has_absurd_lever(const ObserveSolution& report) {
-  constexpr double beyond = 3.0;  // σ of what is assumed of heads
+  constexpr double beyond = 3.0;  // σ that is assumed for heads
   const double most_m = beyond * CommonPrior(RotatingCamera()).sigma_lever_m;
-  // One that is there leaves no frames that err as a whole.
+  // With a real lever, no frames with common errors would remain.
   return report.jitter.noise_rad() > 0.0 &&
          std::ranges::any_of(report.quantities, [&](const ObservedQuantity& quantity) {
            return quantity.name.starts_with("lever_") && std::abs(quantity.value) > most_m;

@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// Σ w Jᵀ J of many J, 2 × n, in batches: the product of two rows alone is mostly overhead.
+/// Σ w Jᵀ J of many J, 2 × n, in batches: the product of two rows alone would be mostly overhead.
 class GramSum {
  public:
-  /// Adds w Jᵀ J (J 2 × n, w ≥ 0) to the sum, n × n, whose lower triangle alone is written, now or at flush(): until
-  /// then the sum must stay where it is.
+  /// Adds w Jᵀ J (J 2 × n, w ≥ 0) to the n × n sum, of which only the lower triangle
+  /// is written, now or at flush(): until then the sum must stay at its address.
   template <typename Rows>
   void add(const Eigen::MatrixBase<Rows>& J, double weight, Eigen::MatrixXd& sum) {
     if (used_ > 0 && (&sum != sum_ || used_ == batch)) flush();
@@ -26,7 +26,7 @@ class GramSum {
 
  private:
   static constexpr Eigen::Index batch = 64;
-  Eigen::MatrixXd columns_;  ///< Of J, transposed, each by the root of its weight.
+  Eigen::MatrixXd columns_;  ///< Of J, transposed, each times the square root of its weight.
   Eigen::Index used_ = 0;
   Eigen::MatrixXd* sum_ = nullptr;
 };

@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t max_turns = 240;  // the solve is cubic in rotations, or in points
+constexpr std::size_t max_turns = 240;  // the solve is cubic in the number of rotations or of points
 
-/// Measured rotations are eliminated one by one while the points are fewer; each costs the square of its points.
+/// Measured rotations are eliminated one by one if there are few points; the cost per rotation is quadratic in these.
 std::size_t most_rows(std::span<const RotationFrame> frames, std::size_t num_points, EstimatedRotations rotations) {
   constexpr double most = 4e8;  // products: a second or less
   const auto segments = static_cast<std::size_t>(

@@ -13,9 +13,9 @@
 namespace alidade {
 namespace {
 
-constexpr double inverse_depth_information = 1.0;  // a point is 1 m away or farther: σ 1/m
+constexpr double inverse_depth_information = 1.0;  // a point is about 1 m away or farther: σ = 1/m
 
-/// The state of a bundle in its search: everything that is estimated.
+/// Everything that is estimated in a bundle.
 struct AdjustedState {
   RotatingCamera camera;
   std::vector<BearingPoint> points;
@@ -54,8 +54,8 @@ class Solver {
         if (moved) state_ = next;
         damping = moved ? std::max(damping * 0.1, 1e-12) : damping * 10.0;
       }
-      // Nothing lowers the cost any more: the bottom, but for rounding; or for a point that hardly anything determines
-      // and that goes on along its Huber cost, of which nothing else takes notice.
+      // The cost does not decrease any more: a minimum up to rounding, or a hardly
+      // determined point that moves on along its Huber cost without any effect on the rest.
       constexpr double hardly = 1e-3;  // of χ²: 0.03σ
       constexpr int enough = 3;        // times in a row
       const double gain = cost - next_cost;
@@ -75,8 +75,8 @@ class Solver {
   }
 
  private:
-  /// Whether steps that gain in proportion to the last ones would not settle in those that are left, far from where
-  /// most residuals are noise.
+  /// Whether steps whose gains decrease at the present rate would not converge within
+  /// the remaining iterations, while most residuals are still far above the noise.
   [[nodiscard]] bool is_hopeless(const std::vector<double>& gains, double cost) const {
     constexpr std::size_t enough = 20, over = 5;
     constexpr double settled = 1e-3, by_far = 1.5, far_off = 5.0;
@@ -113,7 +113,7 @@ class Solver {
     return k > 0.0 && norm > k ? k / norm : 1.0;
   }
 
-  /// Twice the negative log-likelihood; infinite where a point has no pixel.
+  /// Twice the negative log-likelihood; infinite if a point has no pixel.
   [[nodiscard]] double cost_at(const AdjustedState& state) const {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     if (!(state.camera.k[0] > 0.02 && state.camera.k[1] > 0.02)) return infinity;
@@ -150,8 +150,8 @@ class Solver {
   [[nodiscard]] static Eigen::Vector3d rotation_error(const AdjustedState& state, int k) {
     return k < 0 ? Eigen::Vector3d::Zero() : state.rotation_errors[static_cast<std::size_t>(k)];
   }
-  /// 1/σ² of a rotation, or of its step from the frame before. The first frame of rotations that are not measured, or
-  /// walk, is fixed: the world's orientation is free.
+  /// 1/σ² of a rotation, or of its step from the frame before. For unmeasured rotations
+  /// or a random walk the first frame is fixed (gauge freedom of the world orientation).
   [[nodiscard]] double rotation_information(int k) const {
     constexpr double fixed = 1e12;
     if (!is_random_walk())
@@ -173,7 +173,7 @@ class Solver {
     return (distance_m - range.range_m) / config_.sigma_range_m;
   }
 
-  /// Normal equations at that state, prior included.
+  /// Normal equations at the current state, including the prior.
   void linearise() {
     const int n = layout_.size;
     normal_.common = prior_.information(layout_);
@@ -211,7 +211,7 @@ class Solver {
       block.gradient[2] =
           inverse_depth_information * (state_.points[i].inverse_depth - bundle_.points[i].inverse_depth);
     } else {
-      block.information(2, 2) = 1.0;  // nothing else touches it: the step is zero
+      block.information(2, 2) = 1.0;  // without any coupling: the step is zero
     }
   }
 
@@ -349,7 +349,7 @@ class Solver {
   const RotationBundleConfig& config_;
   const CommonLayout layout_;
   const CommonLayout rotation_layout_{with_turn(config_.nuisances)};
-  int num_rotations_ = 0;  ///< Frames whose rotation is estimated.
+  int num_rotations_ = 0;  ///< Number of frames with an estimated rotation.
   AdjustedState state_;
   BundleNormal normal_;
   std::vector<double> residual_px_;

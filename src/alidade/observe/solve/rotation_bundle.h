@@ -10,14 +10,14 @@
 
 namespace alidade {
 
-/// Where a point was seen.
+/// Observation of a point.
 struct BundleObservation {
   int frame = 0;
   int point = 0;
   Eigen::Vector2d px;  ///< Normalised.
 };
 
-/// How far a point was from the camera centre.
+/// Measured distance of a point from the camera centre.
 struct BundleRange {
   int frame = 0;
   int point = 0;
@@ -36,24 +36,24 @@ struct RotationBundle {
 
 struct RotationBundleConfig {
   ObserveNuisances nuisances;
-  bool with_depth = false;  ///< Points have a depth: a lever arm or a measured velocity is in play.
+  bool with_depth = false;  ///< Points have a depth: needed for a lever arm or a measured velocity.
   double sigma_px = 1e-3;   ///< Of each observation, normalised.
   double sigma_range_m = 1e-3;
-  double sigma_rotation_rad = 0.0;  ///< Of each frame's rotation, where nuisances.rotation; infinite: not measured.
+  double sigma_rotation_rad = 0.0;  ///< Of each frame's rotation, with nuisances.rotation; infinite: not measured.
   double sigma_rate_rad_per_s =
-      0.0;             ///< Above zero: rotations are integrated rates with this white noise per sample: a random walk.
-  double huber = 2.5;  ///< Residuals beyond so many σ count less. 0: all count alike.
+      0.0;             ///< If positive, rotations are integrated rates with this white noise per sample: a random walk.
+  double huber = 2.5;  ///< Huber threshold [σ]: larger residuals are downweighted. 0: least squares.
   int max_iterations = 60;
-  bool gives_up = false;  ///< It ends unsettled as soon as it seems that it will, where residuals are many σ.
+  bool gives_up = false;  ///< Stops early if convergence seems unlikely and residuals are many σ.
 };
 
-/// Prior of the shared parameters: normal distributions, weak where nothing is given.
+/// Prior of the shared parameters: normal distributions, weak unless given.
 struct CommonPrior {
   explicit CommonPrior(const RotatingCamera& mean_in);
   RotatingCamera mean;
   Eigen::Vector4d sigma_k;           ///< fx, fy: half their value; cx, cy: a quarter of the image.
   std::array<bool, 4> is_given_k{};  ///< sigma_k is given by the user, not weak.
-  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, where given (square pixels).
+  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, if given (square pixels).
   double sigma_k1 = 0.5;                                          ///< k2, k3 too.
   double sigma_tangential = 0.05;
   double sigma_mount_rad = 0.2;
@@ -64,7 +64,7 @@ struct CommonPrior {
   double sigma_error = 1.0;  ///< Of errors of the rotation, in units of their typical sizes: counts as given.
 
   [[nodiscard]] CommonMatrix information(const CommonLayout& layout) const;
-  /// Of what the user gave alone.
+  /// Only the part that the user gave.
   [[nodiscard]] CommonMatrix given_information(const CommonLayout& layout) const;
   /// Values minus the mean, in the layout's order.
   [[nodiscard]] CommonVector offset(const CommonLayout& layout, const RotatingCamera& camera) const;
@@ -72,8 +72,8 @@ struct CommonPrior {
   [[nodiscard]] CommonPrior about(const RotatingCamera& camera) const;
 };
 
-/// A point's share of the joint covariance given the shared parameters c: point = point_mean + slope (c − c_mean) + e,
-/// e ~ N(0, cov). Inverse depth is the third coordinate, if there is one.
+/// Covariance of a point given the shared parameters c: point = point_mean + slope (c − c_mean) + e, e ~ N(0, cov), as
+/// its part of the joint covariance. Inverse depth is the third coordinate, if there is one.
 using PointByCommonSlope = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
 struct PointGivenCommon {
   PointByCommonSlope slope;
@@ -85,33 +85,33 @@ struct BundleSolution {
   int iterations = 0;
   RotatingCamera camera;
   std::vector<BearingPoint> points;
-  std::vector<Eigen::Quaterniond> mount_from_start;  ///< One per frame, with its rotation.
-  CommonMatrix information;  ///< Of the shared parameters but the rotation, all else eliminated, without the prior, in
+  std::vector<Eigen::Quaterniond> mount_from_start;  ///< One per frame, including the estimated rotation.
+  CommonMatrix information;  ///< Of the shared parameters except rotation, all else eliminated, without prior, in
                              ///< units of 1/σ².
   CommonMatrix prior_information;
-  CommonVector prior_gradient;                 ///< Of half the prior's cost.
-  CommonMatrix given_information;              ///< Of the prior, the part that the user gave.
-  std::vector<PointGivenCommon> given_common;  ///< One per point; not where rotations are estimated.
-  // Where each frame's rotation is estimated, one per frame:
-  std::vector<Eigen::Vector3d> rotation_errors;   ///< Of the measured rotation. [rad]
-  std::vector<double> rotation_information;       ///< 1/σ² of it, or of its step from the frame before.
-  std::vector<double> rotation_information_seen;  ///< What its own pixels add to that, the mean of three axes.
-  bool rotations_walk = false;                    ///< The latter.
+  CommonVector prior_gradient;                 ///< Gradient of half the prior's cost.
+  CommonMatrix given_information;              ///< The part of the prior that the user gave.
+  std::vector<PointGivenCommon> given_common;  ///< One per point; empty if rotations are estimated.
+  // If the rotation of each frame is estimated, one per frame:
+  std::vector<Eigen::Vector3d> rotation_errors;   ///< Of the measured rotation [rad].
+  std::vector<double> rotation_information;       ///< 1/σ² of the rotation, or of its step from the frame before.
+  std::vector<double> rotation_information_seen;  ///< Added by the frame's own pixels, mean over three axes.
+  bool rotations_walk = false;                    ///< True: the prior is a random walk (steps).
   std::vector<Eigen::Vector2d> residuals;         ///< Prediction minus pixel, one per observation, normalised.
   std::vector<double> residual_px;                ///< Their norms.
-  double sum_squares = 0.0;                       ///< Of weighted residuals over σ.
-  double rms_px = 0.0;                            ///< A coordinate, normalised, unweighted.
+  double sum_squares = 0.0;                       ///< Of the weighted residuals over σ.
+  double rms_px = 0.0;                            ///< Per coordinate, normalised, unweighted.
   int dof = 0;                                    ///< Measurements minus unknowns.
 
   [[nodiscard]] CommonMatrix covariance() const;
-  /// Cramér–Rao bound at the solution: without the weak prior. Not finite where the data do not determine it.
+  /// Cramér–Rao bound at the solution, without the weak prior. Not finite if the data do not determine it.
   [[nodiscard]] CommonMatrix bound() const;
 };
 
-/// Rotation-only bundle adjustment: Levenberg–Marquardt on the shared parameters, all points, and (with
-/// nuisances.rotation) each frame's rotation; points are eliminated block by block (Schur complement), so that the time
-/// grows linearly in them. Throws Interrupted. Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment — a modern
-/// synthesis", 2000, section 6.
+/// Rotation-only bundle adjustment: Levenberg–Marquardt on the shared parameters, all points and (with
+/// nuisances.rotation) the rotation of each frame; points are eliminated block by block (Schur complement), so that the
+/// time is linear in their number. Throws Interrupted. Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment — a
+/// modern synthesis", 2000, section 6.
 [[nodiscard]] BundleSolution solve_rotation_bundle(const RotationBundle& bundle, const CommonPrior& prior,
                                                    const RotationBundleConfig& config, const Progress& progress = {});
 

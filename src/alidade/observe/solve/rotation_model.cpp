@@ -28,13 +28,13 @@ CommonLayout::CommonLayout(const ObserveNuisances& nuisances) {
 
 namespace {
 
-/// A ray's position in the image of focal length one, distorted by the lens; Brown 1971.
+/// Distorted position of a ray in the normalised image plane (focal length one), with derivatives; Brown 1971.
 struct Bent {
   Eigen::Vector2d xy;
   double dxx, cross, dyy;  ///< ∂x'/∂x, ∂x'/∂y = ∂y'/∂x, ∂y'/∂y
 };
 
-/// False beyond the fold of the lens.
+/// False beyond the radius at which the distortion folds over.
 bool bend(const RotatingCamera& c, double x, double y, Bent& bent) {
   const double r2 = x * x + y * y;
   if (!(1.0 + r2 * (3.0 * c.k1 + r2 * (5.0 * c.k2 + r2 * 7.0 * c.k3)) > 0.0)) return false;
@@ -48,7 +48,7 @@ bool bend(const RotatingCamera& c, double x, double y, Bent& bent) {
   return true;
 }
 
-/// Of the pixel, by the point in the camera frame.
+/// Derivative of the pixel by the point in the camera frame.
 Eigen::Matrix<double, 2, 3> pixel_by_cam(const Eigen::Vector4d& k, const Eigen::Vector3d& d, const Bent& bent) {
   const double iz = 1.0 / d.z(), x = d.x() * iz, y = d.y() * iz;
   Eigen::Matrix<double, 2, 3> J;
@@ -139,7 +139,7 @@ double RotationView::late_at_row(double v) const {
 
 bool RotationView::turn_to_row_of(const BearingPoint& point) {
   double late_s = camera_.delay_s;
-  constexpr int max_rounds = 12;  // each leaves a hundredth: a row's time moves the point by few rows
+  constexpr int max_rounds = 12;  // each leaves about 1 % of the error: within one row time a point moves by few rows
   for (int i = 0; i < max_rounds; ++i) {
     const auto px = project_at_once(point);
     if (!px) return false;
@@ -176,7 +176,7 @@ bool RotationView::predict(const BearingPoint& point, const CommonLayout& layout
   return rolls ? predict_by_rows(point, layout, out) : predict_at_once(point, layout, out);
 }
 
-/// Where a pixel moves, its row and with it its time does too: dp = P dθ + (∂p/∂t) (shutter / height) dp_y, solved for
+/// When a pixel moves, its row and thus its time change too: dp = P dθ + (∂p/∂t) (shutter / height) dp_y, solved for
 /// dp.
 bool RotationView::predict_by_rows(const BearingPoint& point, const CommonLayout& layout,
                                    RotationPrediction& out) const {

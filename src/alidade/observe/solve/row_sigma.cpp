@@ -9,7 +9,7 @@ void raise_sigma(const CommonMatrix& model, const CommonMatrix& stated, const Ei
   const Eigen::Array4d before = model.diagonal().head<4>(), after = stated.diagonal().head<4>();
   const Eigen::Array4d factor = inflation.square();
   const Eigen::Array4d share = (after - factor * before).max(0.0) / last_k.head<2>().prod();
-  if (!before.allFinite() || !share.allFinite()) return;  // not every method states a σ of its own
+  if (!before.allFinite() || !share.allFinite()) return;  // not every method provides its own σ
   for (IntrinsicsEstimate& row : rows) {
     if (row.has_value) row.sigma = (factor * row.sigma.array().square() + share * (row.fx * row.fy)).sqrt();
   }

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Of the pixels that it is of, in rows that the filter took in: what no camera explains says nothing of zooms.
+/// Share of rejected pixels in rows that the filter accepted: rows that no camera explains are no evidence of zooms.
 double rejected_share(const ObserveSolution& solution, const RotationLog& log,
                       const std::vector<IntrinsicsEstimate>& filtered) {
   const RotationBundle& bundle = solution.reference.bundle;
@@ -28,7 +28,7 @@ double rejected_share(const ObserveSolution& solution, const RotationLog& log,
   return out / std::max(1.0, all);
 }
 
-/// Whether one of what all rows ask for most, once it is estimated, leaves no more noise than this.
+/// Whether estimating one of the causes that all rows indicate most strongly leaves no more noise than `noise_px`.
 bool a_cause_explains(const RotationLog& log, const ObserveSetup& whole, ObserveSolution& all, double noise_px,
                       const Progress& progress) {
   constexpr double as_well = 1.05;
@@ -41,21 +41,21 @@ bool a_cause_explains(const RotationLog& log, const ObserveSetup& whole, Observe
     if (!free_cause(causes[i].name, log, freer)) continue;
     const ObserveSolution freed = solve_as_given(log, freer, progress);
     if (!is_answer(freed) || !(freed.sigma_px < as_well * noise_px)) continue;
-    all.causes = {causes[i]};  // far from the optimum the scores' order is not theirs
+    all.causes = {causes[i]};  // far from the optimum, the order of the scores is unreliable
     return true;
   }
   return false;
 }
 
-/// A step of the mounting that explains as much as the zooms of the report.
+/// A step of the mounting that explains the log as well as the zooms of the report do.
 std::optional<MountingStep> step_instead(const RotationLog& log, const ObserveSetup& config,
                                          const ObserveSolution& report, const Progress& progress) {
-  constexpr double as_well = 1.1, less = 0.9;  // than the zooms, and than neither
+  constexpr double as_well = 1.1, less = 0.9;  // than the zooms, and than neither of them
   return mounting_step(log, config, report, as_well * report.sigma_px, less, progress);
 }
 
-/// A camera that was bumped: each part of the log seems to be of another one. In a short log a constant cause does what
-/// a step does as well: then that is asked for. False: neither.
+/// A bumped camera: each part of the log seems to be from another one. In a short log a constant cause may explain as
+/// much as a step; then that cause is indicated instead. False: neither.
 bool takes_step(const RotationLog& log, const ObserveSetup& config, const ObserveSetup& whole, const Progress& progress,
                 ObserveSolution& all, ObserveSolution& report) {
   const auto step = step_instead(log, config, report, progress);
@@ -70,7 +70,7 @@ bool takes_step(const RotationLog& log, const ObserveSetup& config, const Observ
   return true;
 }
 
-/// Frames err as a whole, and their pixels about that by no more than this: a zoom moves those at the rim otherwise.
+/// Whether each frame has a common error and its pixels scatter about it by less than `noise_px`; a zoom adds scatter.
 bool is_noise_of_rotation(const ObserveSolution& all, double noise_px) {
   return all.jitter.noise_rad() > 0.0 && all.jitter.within_frames * all.scale.scale < noise_px;
 }
@@ -86,7 +86,7 @@ bool has_zoom(const ObserveSolution& report) {
 void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
                   ObserveSolution& report) {
   constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
-  constexpr double more = 0.05;  // of the pixels: rows of another focal length are rejected together, and raise nothing
+  constexpr double more = 0.05;  // of the pixels: rows of another focal length are rejected as a whole, adding no noise
   const bool is_known = config.rotation == RotationKnowledge::known;
   if (!has_zoom(report) || report.mounting_step || !is_known || !is_answer(report) ||
       config.method != ObserveMethod::hybrid)
@@ -111,7 +111,7 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
     return;
   }
   if (takes_step(log, config, whole, progress, all, report)) return;
-  constexpr double far_off = 3.0;  // the noise of one camera's rows beside a real zoom's: nothing is determined by them
+  constexpr double far_off = 3.0;  // noise of one camera over that with zooms: if the zooms are real, it is large
   if (rejects_rows || all.sigma_px > far_off * report.sigma_px) return;
   const CauseScore* best = best_cause(all);
   if (best == nullptr || best->name == "focal length that drifts") return;

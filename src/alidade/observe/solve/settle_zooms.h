@@ -6,9 +6,9 @@ namespace alidade {
 
 [[nodiscard]] bool has_zoom(const ObserveSolution& report);
 
-/// What is not modelled, and errors that last, may look like zooms, and each rest between them be explained by itself.
-/// Where all rows fit one camera nearly as well there was no zoom: theirs is the answer. Where they do not but are
-/// steady, what they ask for counts. Frames that err as a whole are noise of the rotation.
+/// Unmodelled effects and lasting errors may look like zooms, and be explained separately in each span between them. If
+/// all rows fit one camera nearly as well, there was no zoom: their adjustment is the answer. If they do not, but the
+/// camera is constant, the causes they indicate count. Common errors of frames are noise of the rotation.
 void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
                   ObserveSolution& report);
 

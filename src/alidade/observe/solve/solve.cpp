@@ -10,7 +10,7 @@ namespace {
 
 constexpr int max_rounds = 6;
 
-/// Without an answer there may be one where the camera is mounted askew, late, and distorts its image.
+/// Without an answer, tries to estimate a rotated mounting, a delay and distortion as well.
 ObserveSolution second_chance(const RotationLog& log, ObserveSetup& config, const Progress& progress) {
   ObserveSetup freer = config;
   freer.nuisances.mount = freer.nuisances.delay = true;
@@ -20,7 +20,7 @@ ObserveSolution second_chance(const RotationLog& log, ObserveSetup& config, cons
   return report;
 }
 
-/// A focal length that changes faster than warmth or a creeping focus do is a zoom.
+/// A focal length that changes faster than by temperature or focus creep is a zoom.
 constexpr double fastest_drift_per_s = 0.003;
 
 bool zooms(const CauseScore& cause) {
@@ -31,10 +31,10 @@ bool is_of_lens(const std::string& cause) {
   return cause.size() >= 2 && (cause[0] == 'k' || cause[0] == 'p') && cause[1] >= '1' && cause[1] <= '3';
 }
 
-/// Another cause that explains the residuals about as well as the one that was freed.
+/// Another cause that explains the residuals about as well as the one that is estimated.
 struct Rival {
   std::string freed, name;
-  double by_px = 0.0;  ///< How far the answers are from each other.
+  double by_px = 0.0;  ///< Difference between the answers.
 };
 
 void note_rivals(const ObserveSolution& report, const CauseScore& best, std::vector<Rival>& rivals) {
@@ -51,7 +51,7 @@ void note_rivals(const ObserveSolution& report, const CauseScore& best, std::vec
   }
 }
 
-/// Of those that are not estimated in the end.
+/// Checks for the rivals that are not estimated in the end.
 std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const RotationLog& log, const ObserveSetup& config) {
   std::vector<Check> checks;
   for (const Rival& rival : rivals) {
@@ -66,7 +66,7 @@ std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const Rotation
   return checks;
 }
 
-/// Frees one cause after the other, the one that explains most first.
+/// Estimates one more cause at a time, the one that explains most first.
 void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report,
                      std::vector<Rival>& rivals) {
   for (int round = 0; round < max_rounds && is_answer(report); ++round) {
@@ -86,7 +86,7 @@ void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveSe
   }
 }
 
-/// Residuals that are more than points' noise, or zooms, may be several causes at once.
+/// Residuals above the noise of points, or zooms, may be due to several causes at once.
 bool is_doubtful(const ObserveSolution& report) {
   constexpr double max_ordinary_px = 2.0, many = 9.0, vague = 0.005;
   if (!is_answer(report)) return true;
@@ -94,7 +94,7 @@ bool is_doubtful(const ObserveSolution& report) {
          report.quantities[0].sigma > vague * report.quantities[0].value;
 }
 
-/// Tries sets of causes from what the user gave.
+/// Tries sets of causes, starting from the given configuration.
 bool search_causes(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report) {
   constexpr double clearly = 0.6, with_zoom = 3.0, max_px = 2.0;
   double max_px_here = max_px;
@@ -119,8 +119,8 @@ bool search_causes(const RotationLog& log, const Progress& progress, ObserveSetu
   return true;
 }
 
-/// A zoom that never rests: it is asked for as a drift that is none, or the answer is vague, and no second stands
-/// still.
+/// A zoom that never rests: it is indicated as a drift that is too fast, or σ is large and the focal length is not
+/// constant in any second.
 bool never_rests(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
                  const Progress& progress) {
   constexpr double vague = 0.005, max_ordinary_px = 2.0;
@@ -134,8 +134,8 @@ bool never_rests(const RotationLog& log, const ObserveSetup& config, const Obser
   return is_vague && has_no_rest(log, config, report, progress);
 }
 
-/// A filter is never worse than the adjustment of all rows: where it did not settle, or is off by more than its σ,
-/// theirs is the answer, and the report says so.
+/// The adjustment of all rows is the answer if the filter did not converge, or differs from it by more than its σ
+/// explains; the report says so. Thus a filter is never worse.
 void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
                      ObserveSolution& report) {
   constexpr double max_off = 3.0;
@@ -157,7 +157,7 @@ void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const P
   report = std::move(all);
 }
 
-/// What is estimated and yet rests on what instruments ordinarily have.
+/// Notes parameters that are estimated, but essentially from the typical sizes for instruments.
 void note_ungiven(const ObserveSolution& report, const std::vector<RotationError>& errors,
                   std::vector<Check>& side_checks) {
   constexpr double hardly = 0.7;
@@ -174,7 +174,7 @@ void note_ungiven(const ObserveSolution& report, const std::vector<RotationError
                          0.0, 0.0, "", "residuals"});
 }
 
-/// Asked for, but as no head has it: what asks for it is something else. Its share of σ stays.
+/// A lever is indicated, but of a size that no head has: it is due to something else. Its contribution to σ stays.
 void drop_lever(ObserveSolution& report) {
   std::erase_if(report.causes, [](const CauseScore& cause) { return cause.name.starts_with(lever_cause); });
   report.side_checks.push_back(
@@ -193,13 +193,13 @@ void note_assumed(ObserveSolution& report) {
                                 "", "residuals"});
 }
 
-/// Residuals that no noise of a finder makes, or no answer: the rotation may be misread as well.
+/// Residuals larger than the noise of any detector, or no answer: the rotation may be misread as well.
 bool is_gross(const ObserveSolution& report) {
   constexpr double max_ordinary_px = 2.0;
   return may_be_misread(report) && (!is_answer(report) || report.sigma_px > max_ordinary_px);
 }
 
-/// Frees what the residuals ask for: sets of causes where the answer is doubtful, one after the other where not.
+/// Estimates what the residuals indicate: sets of causes if the answer is doubtful, else one cause after the other.
 void find_causes(const RotationLog& log, const ObserveSetup& given, const Progress& progress, ObserveSetup& config,
                  ObserveSolution& report, std::vector<Rival>& rivals) {
   using Status = ObserveSolution::Status;
@@ -221,7 +221,7 @@ void find_causes(const RotationLog& log, const ObserveSetup& given, const Progre
   free_one_by_one(log, progress, config, report, rivals);
 }
 
-/// What nothing else explains, and is of no zoom, may be a bump.
+/// Residuals that nothing else explains, and that are not due to a zoom, may be due to a bump.
 void seek_step(const RotationLog& log, const ObserveSetup& config, const Progress& progress, ObserveSolution& report) {
   constexpr double much_less = 0.6, max_ordinary_px = 2.0;
   if (report.mounting_step || !is_answer(report) || !is_doubtful(report) || has_zoom(report)) return;
@@ -242,7 +242,7 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
   const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
   const bool is_known = config.rotation == RotationKnowledge::known;
   const bool is_judged = is_known && !is_regression && report.status != Status::too_few_data;
-  // No cause explains a rotation that is read otherwise than it was meant: seconds are not spent on looking for one.
+  // No cause explains a misread rotation: the time for searching one is saved.
   Misread misread;
   if (is_judged && is_gross(report)) misread = misread_rotation(log, config, report, progress);
   const bool is_noisy = config.rotation == RotationKnowledge::noisy && report.status != Status::too_few_data;

@@ -16,7 +16,7 @@ void add_turns(const RotationLog& log, const std::vector<RotationError>& errors,
 }
 
 bool is_observable(const ObserveSolution& report, const CommonMatrix& bound) {
-  constexpr double most = 0.05;  // of the focal length; of the image's width
+  constexpr double most = 0.05;  // share of the focal length; of the image width
   const Eigen::Vector4d& k = report.reference.solution.camera.k;
   const Eigen::Vector4d variance = bound.diagonal().head<4>();
   if (!(variance.array() > 0.0).all() || !variance.allFinite()) return false;
@@ -40,15 +40,15 @@ std::vector<RotationError> estimated_errors(const RotationLog& log, const Observ
   return errors;
 }
 
-/// Errors of the rotation are small, and yet not linear (a play opens at each turning point): the log is freed of what
-/// was found, and asked again.
+/// Errors of the rotation are small but non-linear (backlash acts at each reversal): the log is corrected for the
+/// estimated errors, and solved again.
 ObserveSolution solve_as_given(const RotationLog& log, const ObserveSetup& config, const Progress& progress) {
   const bool is_measured = config.rotation != RotationKnowledge::free;
   const std::vector<RotationError> errors = is_measured ? estimated_errors(log, config) : std::vector<RotationError>{};
   RotationErrors undone = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
   ObserveSolution report = solve_once(log, config, errors, undone, progress);
   constexpr int max_rounds = 4;
-  constexpr double little = 0.02;  // of the ordinary size: what is left of it is linear
+  constexpr double little = 0.02;  // of the typical size: below it, the remaining error is linear
   for (int round = 1; round < max_rounds && !errors.empty(); ++round) {
     if (report.status != ObserveSolution::Status::ok || report.errors.size() != undone.size()) break;
     if ((report.errors - undone).cwiseAbs().maxCoeff() < little) break;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t max_cells = 4000000;
 
-/// One run over one log: frames, scale and start made once, then a method, then the reference.
+/// One run over one log: frames, scale and initial guess are computed once, then the method and the reference are run.
 class Observation {
  public:
   Observation(const RotationLog& log, const ObserveSetup& config, const std::vector<RotationError>& errors,
@@ -247,7 +247,7 @@ class Observation {
     return buffer;
   }
 
-  /// All rows since the intrinsics last changed, together: the bound, and the answer of `batch`.
+  /// Adjusts all rows since the last change of the intrinsics together: for the bound, and the answer of `batch`.
   void solve_reference() {
     const FrameBuffer buffer = reference_frames();
     AdjustConfig config = adjust_config_of(log_, config_, start_, report_.scale);
@@ -275,7 +275,7 @@ class Observation {
     }
   }
 
-  /// Are the rows that the answer rests on of one focal length?
+  /// Whether the rows behind the answer have different focal lengths.
   [[nodiscard]] bool focal_length_varies() const {
     return config_.rotation == RotationKnowledge::known && report_.reference.has_value &&
            focal_variation_of(report_.reference.bundle, report_.reference.solution).is_significant();
@@ -311,8 +311,8 @@ class Observation {
         is_observable(report_, bound) ? ObserveSolution::Status::ok : ObserveSolution::Status::unobservable;
   }
 
-  /// The last row, and where all rows are one answer all of them, have the stated σ; a filter's other rows what it
-  /// adds.
+  /// The last row gets the stated σ, and so do all rows if they are one
+  /// answer; a filter's other rows get the increase that the last one got.
   void state_steps() {
     const CommonLayout layout(model_cov_.rows() == 4 ? ObserveNuisances{} : config_.nuisances);
     const bool is_one = config_.method == ObserveMethod::batch || config_.rotation != RotationKnowledge::known;
@@ -323,7 +323,7 @@ class Observation {
     }
   }
 
-  /// What the reference says of the errors that pixels share, and what is given with a σ, on top of the model's.
+  /// Adds to the model's covariance the errors that pixels share according to the reference, and the given σ.
   void state_covariance(const CommonLayout& layout) {
     const Eigen::VectorXd& inflation = report_.stated.inflation;
     if (inflation.size() >= layout.size) {
@@ -336,7 +336,7 @@ class Observation {
     report_.assumed = taken_as_given(log_, config_, report_, final_cov_);
   }
 
-  /// Where both are of one camera: the reference says whether the answer is as good as its σ.
+  /// If both are of one camera, the reference shows whether the answer is as accurate as its σ.
   void compare_with_reference() {
     const bool is_of_end = constant_at_end_ || report_.reference_until_s >= frames_.back().t_s - 1e-6;
     if (!is_of_end || config_.method == ObserveMethod::batch) return;
@@ -344,7 +344,7 @@ class Observation {
     const Eigen::Vector4d of_reference = CommonMatrix(report_.stated.cov).diagonal().head<4>();
     Eigen::Vector4d own = final_cov_.diagonal().head<4>();
     if (!own.allFinite()) {
-      own = difference.cwiseAbs2();  // the method states none
+      own = difference.cwiseAbs2();  // the method has no σ
       final_cov_ = CommonMatrix((own + of_reference).asDiagonal());
       report_.sigma_is_distance = true;
     }
@@ -383,7 +383,7 @@ class Observation {
   ObserveSolution report_;
   std::vector<RotationFrame> frames_;
   bool free_started_ = false, has_final_ = false;
-  bool constant_at_end_ = false;  ///< The intrinsics that the reference is of last to the end of the log.
+  bool constant_at_end_ = false;  ///< The intrinsics of the reference last to the end of the log.
   RotatingCamera start_, final_;
   CommonMatrix final_cov_, model_cov_;
   Eigen::Array4d inflation_ = Eigen::Array4d::Ones();

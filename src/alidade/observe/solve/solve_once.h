@@ -7,29 +7,29 @@
 
 namespace alidade {
 
-/// One run over one log with the errors of its rotation that are estimated; `undone`: what the log is free of already.
+/// One run over one log, estimating the given errors of its rotation; `undone`: the part already corrected for.
 [[nodiscard]] ObserveSolution solve_once(const RotationLog& log, const ObserveSetup& config,
                                          const std::vector<RotationError>& errors, const RotationErrors& undone,
                                          const Progress& progress);
 
-/// Gives each frame how the errors rotate it, per ordinary size.
+/// Sets in each frame the effect of the errors on its rotation, per typical size.
 void add_turns(const RotationLog& log, const std::vector<RotationError>& errors, double max_gap_s,
                std::vector<RotationFrame>& frames);
 
-/// How the bundle of a log is adjusted.
+/// The configuration for adjusting the bundle of a log.
 [[nodiscard]] AdjustConfig adjust_config_of(const RotationLog& log, const ObserveSetup& config,
                                             const RotatingCamera& start, const PixelScale& scale);
 
-/// Does the bound of the reference allow an answer at all?
+/// Whether the bound of the reference is small enough for an answer.
 [[nodiscard]] bool is_observable(const ObserveSolution& report, const CommonMatrix& bound);
 
-/// fx, fy, cx, cy [px] of the last row until then; none at the end of the log, or where no row has any.
+/// fx, fy, cx, cy [px] of the last row until `until_s`; none at the end of the log, or if no row has a value.
 [[nodiscard]] std::optional<Eigen::Vector4d> intrinsics_before(double until_s, const RotationLog& log,
                                                                const std::vector<IntrinsicsEstimate>& rows);
 
-/// Raises the σ of a filter's rows as that of its last row was, from `model` to `stated` (normalised): by the same
-/// factor (`inflation`) for errors that pixels share, by the same share of the focal length for what is given with a σ;
-/// of rows just before a zoom by the change that came. Returns checks of the changes that the rows followed.
+/// Raises σ of a filter's rows as that of its last row was raised, from `model` to `stated` (normalised): by the same
+/// factor (`inflation`) for errors that pixels share, by the same share of the focal length for given values with a σ;
+/// for rows just before a zoom, by the change that followed. Returns checks of the changes that the rows followed.
 [[nodiscard]] std::vector<Check> state_rows(const RotationLog& log, const CommonMatrix& model,
                                             const CommonMatrix& stated, const Eigen::Array4d& inflation,
                                             const Eigen::Vector4d& last_k, std::vector<IntrinsicsEstimate>& rows);

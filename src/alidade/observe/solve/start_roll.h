@@ -6,8 +6,8 @@
 
 namespace alidade {
 
-/// How far the image is rotated about the view against what rotates, as the motion of the points beside the rotation
-/// shows it. Below half a right angle 0: from there the adjustment finds it by itself. [rad]
+/// Rotation [rad] of the image about the view relative to the rotating part, from the motion of the
+/// points compared with the measured rotation. 0 if below 45°: then the adjustment converges without it.
 [[nodiscard]] double start_roll(std::span<const RotationFrame> frames);
 
 }  // namespace alidade

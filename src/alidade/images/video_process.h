@@ -12,24 +12,24 @@ namespace alidade {
 /// A camera or an image server: "v4l2:/dev/video0", "rtsp://…", "http://…".
 struct StreamAddress {
   std::string text;
-  std::string password = {};  ///< Of the user in it; reaches the decoder by its environment, and no message.
+  std::string password = {};  ///< The user's password; passed to the decoder by its environment, never in messages.
 };
 
-/// When a frame was taken; NaN: not known.
+/// Time at which a frame was taken; NaN: not known.
 struct FrameTime {
   double media_s = 0.0;  ///< By the video's own clock.
-  double taken_s = 0.0;  ///< Since 1970: by the kernel of a camera, or by RTCP's sender reports.
+  double taken_s = 0.0;  ///< Since 1970: by the kernel for a camera, or by RTCP sender reports.
 };
-/// Whether a text is such an address, rather than a file or a folder.
+/// Whether a text is such an address, not a file or a folder.
 [[nodiscard]] bool is_stream_address(const std::string& text);
 
-/// Decodes a video file in a process of its own, the program alidade_video beside this one: its libraries take longer
-/// to load than most commands run, and a broken file cannot take this program with it.
+/// Decodes a video file in a separate process, the program alidade_video next to this one: its libraries take longer to
+/// load than most commands run, and a broken file cannot crash this program.
 class VideoProcess {
  public:
-  /// Starts it. Throws InputError: no such file, not a video, no decoder.
+  /// Starts the process. Throws InputError for a missing file, not a video, or no decoder.
   VideoProcess(const std::filesystem::path& video, FrameColour colour);
-  /// Frames as they come from a camera or a server. Throws InputError where it gives none.
+  /// Frames as they come from a camera or a server. Throws InputError if it provides none.
   VideoProcess(const StreamAddress& stream, FrameColour colour);
   VideoProcess(const VideoProcess&) = delete;
   VideoProcess& operator=(const VideoProcess&) = delete;
@@ -37,15 +37,15 @@ class VideoProcess {
 
   [[nodiscard]] int width_px() const { return width_px_; }
   [[nodiscard]] int height_px() const { return height_px_; }
-  /// As the file says; 0: it does not.
+  /// According to the file; 0: not stated.
   [[nodiscard]] std::size_t num_frames() const { return num_frames_; }
 
-  /// The next frame's values, row by row (grey, or blue, green and red); empty at the end. Throws InputError if the
+  /// The next frame's values, row-major (grey, or blue, green and red); empty at the end. Throws InputError if the
   /// decoder died.
   [[nodiscard]] std::vector<unsigned char> next();
-  /// Of the frame that next() gave.
+  /// Time of the frame that next() returned.
   [[nodiscard]] const FrameTime& time() const { return time_; }
-  /// Ends the decoder: a next() that waits in another thread throws, as if it had died.
+  /// Ends the decoder: a next() that waits in another thread throws as if it had died.
   void interrupt() const;
 
  private:

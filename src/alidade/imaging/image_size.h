@@ -4,8 +4,8 @@
 
 namespace alidade {
 
-/// Whether a file of so many bytes may have an image of that size: more pixels are a header's lie, or too large to work
-/// with, and no room is made for them. A blank page compresses to one byte in 8000 pixels.
+/// Whether a file with this many bytes may contain an image of this size: more pixels mean a false header, or too large
+/// an image, and no memory is allocated for them. A blank page compresses to one byte per 8000 pixels.
 [[nodiscard]] inline bool is_possible_image(std::size_t width, std::size_t height, std::size_t num_bytes) {
   constexpr std::size_t max_side = 1u << 20, max_pixels = 1u << 30, max_pixels_per_byte = 1u << 14;
   return width >= 1 && height >= 1 && width <= max_side && height <= max_side && width * height <= max_pixels &&

@@ -8,8 +8,8 @@
 
 namespace alidade {
 
-/// The readings without those of a sensor that hangs: of ten and more that are equal in all digits, for 0.1 s or
-/// longer, the first is kept. What is left out is a gap.
+/// The readings without those of a frozen sensor: of ten or more that are equal in all digits, for 0.1 s or longer, the
+/// first is kept. The removed readings leave a gap.
 [[nodiscard]] std::vector<ImuReading> without_frozen(std::vector<ImuReading> readings);
 
 /// Preintegrated IMU readings between two times, in the IMU's axes at the first: rotation, and the effect of specific
@@ -20,25 +20,25 @@ struct ImuStep {
   double dt_s = 0.0;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< first_from_second
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero(), position = Eigen::Vector3d::Zero();
-  /// Derivatives by the biases; of the rotation on the right: R exp(J δb).
+  /// Derivatives with respect to the biases; for the rotation on the right: R exp(J δb).
   Eigen::Matrix3d rotation_by_rate = Eigen::Matrix3d::Zero(), velocity_by_rate = Eigen::Matrix3d::Zero(),
                   position_by_rate = Eigen::Matrix3d::Zero(), velocity_by_force = Eigen::Matrix3d::Zero(),
                   position_by_force = Eigen::Matrix3d::Zero();
-  /// By a time that both ends are later by.
+  /// Derivatives with respect to a common delay of both ends.
   Eigen::Vector3d rotation_by_time = Eigen::Vector3d::Zero(), velocity_by_time = Eigen::Vector3d::Zero(),
                   position_by_time = Eigen::Vector3d::Zero();
 };
 
-/// None where the readings do not reach from the first time to the second, or leave out more than `max_gap_s`. Between
-/// readings rate and force are straight lines. `rate_bias` and `force_bias` are subtracted.
+/// None if the readings do not extend from the first time to the second, or have a gap longer than `max_gap_s`. Rate
+/// and force are linear between readings. `rate_bias` and `force_bias` are subtracted.
 [[nodiscard]] std::optional<ImuStep> preintegrated(std::span<const ImuReading> readings, double from_s, double to_s,
                                                    double max_gap_s, const Eigen::Vector3d& rate_bias,
                                                    const Eigen::Vector3d& force_bias);
 
-/// The reading at a time, between the two around it. None beyond the first and the last.
+/// The reading at a time, interpolated between the two around it. None before the first and after the last.
 [[nodiscard]] std::optional<ImuReading> reading_at(std::span<const ImuReading> readings, double t_s);
 
-/// Median of the times between readings; 0: there are not two.
+/// Median of the times between readings; 0: fewer than two readings.
 [[nodiscard]] double usual_period_s(std::span<const ImuReading> readings);
 
 }  // namespace alidade

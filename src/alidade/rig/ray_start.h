@@ -8,14 +8,14 @@
 
 namespace alidade {
 
-/// A viewing ray through a head's centre and the point that was seen along it.
+/// A viewing ray through a head's centre and the point seen along it.
 struct ObservationLine {
   Eigen::Vector3d direction_in_base;  ///< Unit vector.
   Eigen::Vector3d point_in_board;
 };
 
-/// The pose of points that are seen along such lines, by orthogonal iteration from the 24 rotations of a cube, and the
-/// mean capped angle that is left. None for fewer than six lines. Lu, Hager & Mjolsness, "Fast and globally convergent
+/// Pose of points that are seen along such lines, by orthogonal iteration from the 24 rotations of a cube, and the mean
+/// capped angle that remains. None for fewer than six lines. Lu, Hager & Mjolsness, "Fast and globally convergent
 /// pose estimation from video images", 2000.
 struct ObservationPose {
   Rigid3 base_from_board;
@@ -23,13 +23,13 @@ struct ObservationPose {
 };
 [[nodiscard]] std::optional<ObservationPose> pose_of_observation_lines(std::span<const ObservationLine> lines);
 
-/// What a head's views of a board say of its pose when no view alone does: single points at many angles. Offsets are
-/// taken as zero. `usable`: one per view of the problem.
+/// Pose of a board from all views of one head if no single view determines it: a few points each, at many angles.
+/// Offsets are taken as zero. `usable`: one per view of the problem.
 [[nodiscard]] std::optional<ObservationPose> observation_pose(const RigProblem& problem,
                                                               const std::vector<bool>& usable, const RigHead& rig_head,
                                                               std::size_t head, std::size_t board);
 
-/// The rotations that take a cube to itself.
+/// The 24 rotations that map a cube to itself.
 [[nodiscard]] std::vector<Eigen::Quaterniond> turns_of_a_cube();
 
 }  // namespace alidade

@@ -9,9 +9,9 @@
 
 namespace alidade {
 
-/// Is the board as it was meant? Score tests of its print, wider along its columns than along its rows, and of its
-/// flatness, a surface of second order through its points. What moves no parameter of the heads by its σ is not
-/// returned: boards are a little bent. Arguments as of rig_causes().
+/// Does the board match its description? Score tests of its print (longer along its columns than along its rows) and of
+/// its flatness (a surface of second order through its points). An error that moves no parameter of the heads by its σ
+/// is not returned: most boards are slightly bent. Arguments as of rig_causes().
 [[nodiscard]] std::vector<RigCause> board_print(const RigProblem& problem, const SolvedRig& solved,
                                                 const Eigen::MatrixXd& cov, std::span<const double> weights,
                                                 const Eigen::MatrixXd& cov_lenses, double num_given);

@@ -8,12 +8,12 @@
 
 namespace alidade {
 
-/// What the views say of their lenses each by itself, whatever the heads are: a score test of a k1 beside its own
-/// distortion, the boards' poses following; of the head of which it is most significant. None where no view has a pose.
+/// What the views indicate of their lenses, each on its own and regardless of the heads: a score test of an additional
+/// k1, the boards' poses following; for the head with the most significant one. None if no view has a pose.
 [[nodiscard]] std::optional<RigCause> lens_of_views(const Work& work);
 
-/// Corners that do not lie as those of the board, in more than half of the views that have enough of them: how many, in
-/// words; empty: they do.
+/// Corners that are not arranged like those of the board, in more than half of the views with enough of them: how many,
+/// in words; empty: they are.
 [[nodiscard]] std::string corners_of_another_board(const Work& work);
 
 }  // namespace alidade

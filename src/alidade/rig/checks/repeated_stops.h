@@ -8,17 +8,17 @@
 
 namespace alidade {
 
-/// Views with those of one stop averaged.
+/// Views, with those of the same stop averaged.
 struct AveragedStops {
-  std::vector<HeadView> views;         ///< One a stop: the first, with the mean corners and readings.
-  std::vector<SkippedInput> repeated;  ///< The others, each with the one that it was averaged with.
-  double sigma_within_rad = 0.0;       ///< Of one reading of an axis about its stop's mean; 0: none was repeated.
+  std::vector<HeadView> views;         ///< One per stop: the first one, with mean corners and readings.
+  std::vector<SkippedInput> repeated;  ///< The other views, each with the one it was averaged with.
+  double sigma_within_rad = 0.0;  ///< σ of one reading of an axis about the mean of its stop; 0: none was repeated.
 };
 
-/// A head that stands and takes several photos of one board has one error of its readings and of the corner finder, not
-/// several: n such views, counted as independent, would divide the variance by n. A stop is of consecutive views of one
-/// head, one board, corners within a pixel of those of its first and readings within 0.1° of its own: a head that comes
-/// back makes another.
+/// Several photos of one board by a head at rest share one error of the readings and of the corner detector:
+/// n such views, treated as independent, would divide the variance by n. A stop consists of consecutive views of one
+/// head and one board, with corners within a pixel of those of the first and readings within 0.1° of its own: a head
+/// that returns makes another stop.
 [[nodiscard]] AveragedStops averaged_stops(std::span<const HeadView> views);
 
 }  // namespace alidade

@@ -7,13 +7,13 @@
 #include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/track/target_filter.h"
 
-// The beliefs of target_filter.h where heads, lenses and clocks are uncertain: their errors u ~ N(0, 1) are carried as
-// considered parameters, whose covariance with the state is kept and which no observation changes (Schmidt–Kalman).
+// The beliefs of target_filter.h with uncertain heads, lenses and clocks: their errors u ~ N(0, I) are considered
+// parameters, whose cross-covariance with the state is kept and which no observation changes (Schmidt–Kalman).
 // S. F. Schmidt, "Application of state-space methods to navigation problems", 1966; Bierman, 1977, chapter VIII.
 
 namespace alidade {
 
-/// Covariance of a state with u.
+/// Cross-covariance of a state with u.
 template <int N>
 using WithErrors = Eigen::Matrix<double, N, Eigen::Dynamic, 0, N, max_rig_errors>;
 
@@ -29,7 +29,7 @@ struct CountedErrors {
               const Eigen::Matrix2d&) {}
 };
 
-/// u is estimated as well: its innovations are white if the model is correct, and it shows what of the rig is off.
+/// u is estimated as well: the innovations are white if the model is correct, and u shows the errors of the rig.
 struct LearnedErrors {
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_rig_errors, 1> u;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_rig_errors, max_rig_errors> C;
@@ -51,7 +51,7 @@ struct LearnedErrors {
   }
 };
 
-/// An observation's covariances with state and errors, and the pixel's own.
+/// Cross-covariances of an observation with state and errors, and the covariance of the pixel.
 template <int N>
 struct SeenWithErrors {
   Eigen::Matrix<double, N, 2> PHt;
@@ -83,8 +83,8 @@ template <int N, class Errors>
   return result;
 }
 
-/// iterated_update() with errors. What they do to the pixel is linear: with h = h(x) + H_u u the Gauss–Newton step of
-/// the state is that without them, at the gain of both. False, and no change, where it has no answer.
+/// iterated_update() with errors. Their effect on the pixel is linear: with h = h(x) + H_u u the Gauss–Newton step of
+/// the state is that without them, with the gain of both. False, and no change, if it does not converge.
 template <int N, class Errors>
 [[nodiscard]] bool update_with_errors(Belief<N>& belief, WithErrors<N>& cross, Errors& errors,
                                       const PositionSeen& expected, const RigErrorEffect& effect,
@@ -121,7 +121,7 @@ template <int N, class Errors>
   return true;
 }
 
-/// A target that moves by one model, seen by heads that have errors.
+/// A target with one motion model, observed by heads with errors.
 template <MotionModel Model, class Errors = CountedErrors>
 struct ConsideredFilter {
   static constexpr bool can_smooth = true, considers = true;
@@ -179,7 +179,7 @@ struct ConsideredFilter {
   }
 };
 
-/// A target that is now quiet, now agile, now falls, seen by heads that have errors.
+/// A target that switches between quiet, agile and falling, observed by heads with errors.
 struct ConsideredInteracting {
   static constexpr bool can_smooth = false, considers = true;
   struct Models {
@@ -234,7 +234,7 @@ struct ConsideredInteracting {
   [[nodiscard]] Belief<6> estimate() const { return own.estimate(); }
 
  private:
-  /// Updates one model; the innovation that it saw.
+  /// Updates one model; the innovation that it used.
   template <int N>
   [[nodiscard]] static std::optional<Innovation> updated(Belief<N>& belief, WithErrors<N>& cross,
                                                          const RigErrorEffect& effect, const Eigen::Vector2d& z,

@@ -9,13 +9,13 @@
 
 namespace alidade {
 
-/// h and R of one observation: the head's pose, its camera, and the noise of pixel and encoder. Lives as long as
+/// h and R of one observation: the head's pose, its camera, and the noise of pixel and encoder. Must not outlive
 /// the camera.
 struct ObservationModel {
   TurnedHead turned;
   const Camera* camera;
   double variance_px2, variance_rad2;
-  std::optional<Zoomed> zoomed;  ///< Where the lens is not the camera's own.
+  std::optional<Zoomed> zoomed;  ///< If the lens is not the camera's own.
 
   ObservationModel(const RigHead& head, const Eigen::Vector2d& pan_tilt_rad, double sigma_px, double sigma_encoder_rad,
                    const std::optional<ObservationLens>& lens = {})
@@ -26,7 +26,7 @@ struct ObservationModel {
     if (lens) zoomed.emplace(head.camera, lens->k);
   }
 
-  /// R = σ_px² I + σ_enc² J Jᵀ, J by the readings, at the position.
+  /// R = σ_px² I + σ_enc² J Jᵀ, J with respect to the readings, at the position.
   [[nodiscard]] std::optional<PositionSeen> operator()(const Eigen::Vector3d& position) const {
     const Eigen::Vector3d point_in_cam = turned.point_in_cam(position);
     auto seen = project_with_jacobians(*camera, point_in_cam);

@@ -9,17 +9,17 @@
 #include "alidade/estimation/motion_models.h"
 #include "alidade/track/observation_model.h"
 
-// The beliefs that a tracker can carry, behind one surface: start, predict, expect, update, estimate.
+// The beliefs that a tracker can carry, behind one interface: start, predict, expect, update, estimate.
 
 namespace alidade {
 
-/// A target that moves by one model.
+/// A target with one motion model.
 template <MotionModel Model>
 struct ModelFilter {
   static constexpr bool can_smooth = true, considers = false;
   struct Models {
     Model motion;
-    double start_sigma_rest = 1.0;  ///< Of the state's components beyond position and velocity, at the start.
+    double start_sigma_rest = 1.0;  ///< Initial σ of the state's components beyond position and velocity.
   };
   Belief<Model::dim> belief;
 
@@ -37,7 +37,7 @@ struct ModelFilter {
   [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z) const {
     return innovation_of(belief, seen, z);
   }
-  /// False, and no change, where the update has no answer.
+  /// False, and no change, if the update does not converge.
   [[nodiscard]] bool update(const PositionSeen& seen, const Eigen::Vector2d& z, const ObservationModel& see,
                             const IteratedUpdateConfig& config) {
     const auto updated = iterated_update(belief, seen, z, see, config);
@@ -47,7 +47,7 @@ struct ModelFilter {
   [[nodiscard]] Belief<6> estimate() const {
     return {belief.x.template head<6>(), belief.P.template topLeftCorner<6, 6>()};
   }
-  /// This belief, given the belief dt later: one step back of the smoother.
+  /// This belief, given the belief dt later: one backward step of the smoother.
   /// Rauch, Tung & Striebel, "Maximum likelihood estimates of linear dynamic systems", 1965.
   [[nodiscard]] ModelFilter smoothed(const Models& models, const ModelFilter& later, double dt_s) const {
     if (!(dt_s > 0.0)) return later;
@@ -63,7 +63,7 @@ struct ModelFilter {
   }
 };
 
-/// A target that is now quiet, now agile, now falls.
+/// A target that switches between quiet, agile and falling.
 struct InteractingFilter {
   static constexpr bool can_smooth = false, considers = false;
   using Models = InteractingModels;

@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// The models of motion that the filter has; those that can be requested by name: TrackMethod.
+/// The motion models of the filter; those that can be requested by name: TrackMethod.
 enum class TargetMotion { cv, singer, turn, resting, imm, ballistic };
 
 /// cv, singer, turn, resting, imm, ballistic.
@@ -23,29 +23,29 @@ enum class TargetMotion { cv, singer, turn, resting, imm, ballistic };
 struct TrackerConfig {
   TargetMotion method = TargetMotion::cv;
   double sigma_px = 0.5;
-  double sigma_encoder_rad = 0.0008726646259971648;  ///< 0.05°; for heads whose encoder does not say its own.
-  double sigma_a_m_s2 = 1.0;                         ///< About the target's peak acceleration; see the models.
+  double sigma_encoder_rad = 0.0008726646259971648;  ///< 0.05°; for heads whose encoders have no σ of their own.
+  double sigma_a_m_s2 = 1.0;                         ///< Roughly the target's peak acceleration; see the models.
   double singer_tau_s = 0.5;
   double resting_sigma_v_m_s = 0.9, resting_tau_s = 0.7;
-  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< In the world, for ballistic and imm; so where y is down.
+  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< In the world, for ballistic and imm; default: y down.
   IteratedUpdateConfig update;
-  double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a right observation fails it once in 270 000.
-  double min_depth_m = 0.2, max_depth_m = 20.0;  ///< The rig's working range, along a camera's view.
-  int restart_after = 2;       ///< Rejections one after the other, of one head: then a new track is tried.
-  double together_s = 0.06;    ///< Two heads that far apart in time still intersect.
-  double start_sigma_m = 1.0;  ///< Or a tenth of the distance, where that is more.
+  double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a correct observation fails it once in 270 000.
+  double min_depth_m = 0.2, max_depth_m = 20.0;  ///< Working range of the rig, along a camera's optical axis.
+  int restart_after = 2;       ///< Consecutive rejections for one head after which a new track is tried.
+  double together_s = 0.06;    ///< Maximum time between two heads' observations to be intersected.
+  double start_sigma_m = 1.0;  ///< Or a tenth of the distance, if that is more.
   double start_sigma_v_m_s = 2.0;
-  double history_s = 0.3;      ///< How late an observation may come.
-  std::size_t max_kept = 256;  ///< Observations within history_s; older ones can then no longer be overtaken.
-  /// Of the heads, their lenses and clocks: included in every σ, and not estimated (Schmidt–Kalman). None: all exact.
+  double history_s = 0.3;      ///< Maximum delay of an observation.
+  std::size_t max_kept = 256;  ///< Observations kept within history_s; older ones cannot be preceded by late ones.
+  /// Errors of heads, lenses and clocks: included in every σ, and not estimated (Schmidt–Kalman). None: all exact.
   RigUncertainty errors;
-  /// Estimate the errors instead: for tests of the rig, whose innovations are then white. Not for imm, which counts.
+  /// Estimate these errors instead: for tests of the rig, with white innovations. Not for imm, which considers them.
   bool learn_errors = false;
 };
 
-/// Follows a target in space through the pixels of moving heads, one observation at a time, each at its capture time
-/// and with the angles of that instant, in whatever order they arrive. Allocates nothing once made. Iterated extended
-/// Kalman filter on pixels; docs/maths/tracking.md.
+/// Tracks a target in 3-D through the pixels of moving heads, one observation at a time, each at its capture time
+/// and with the angles of that instant, in any order of arrival. Allocates nothing after construction. Iterated
+/// extended Kalman filter on pixels; docs/maths/tracking.md.
 class Tracker {
  public:
   Tracker(std::vector<RigHead> heads, const TrackerConfig& config);
@@ -64,7 +64,7 @@ class Tracker {
   };
   [[nodiscard]] std::optional<Smoothed> smoothed(double lag_s) const;
 
-  /// u of the rig's errors as estimated so far, and its covariance. None unless errors are estimated.
+  /// u of the rig's errors as estimated so far, and its covariance. None if errors are not estimated.
   struct Learned {
     Eigen::VectorXd u;
     Eigen::MatrixXd cov;
@@ -76,7 +76,7 @@ class Tracker {
   std::unique_ptr<State> state_;
 };
 
-/// Where rays come nearest to one another, by least squares. None where they are parallel within 1 mrad.
+/// Least-squares intersection of rays. None if they are parallel within 1 mrad.
 [[nodiscard]] std::optional<Eigen::Vector3d> nearest_to_rays(const WorldRay& a, const WorldRay& b);
 
 }  // namespace alidade

@@ -12,8 +12,8 @@
 
 namespace alidade {
 
-/// The filter of Xiahou et al. on observations as they come: a step where both heads have seen the target within
-/// 60 ms. Of the first two heads; its steps have a position and σ in the world, and no innovations.
+/// The filter of Xiahou et al. on observations as they arrive: one step whenever both heads have seen the target within
+/// 60 ms. Uses the first two heads; its steps have a position and σ in the world, and no innovations.
 class XiahouTracker {
  public:
   XiahouTracker(std::span<const RigHead> heads, const XiahouConfig& config);

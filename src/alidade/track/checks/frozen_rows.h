@@ -8,14 +8,14 @@
 
 namespace alidade {
 
-/// Rows of heads whose images or encoders stood still, in order of heads and times: of runs of values that repeat the
-/// one before more often than chance explains, those where the head's values otherwise have noise, which repeats
-/// nothing, and those that the track without them contradicts (rounded values, and those of a head at rest, may
+/// Rows of heads whose images or encoders were frozen, ordered by head and time: of runs of repeated values
+/// longer than chance explains, those of heads whose values otherwise have noise, which does not repeat,
+/// and those that the track without them contradicts (rounded values, and those of a head at rest, may
 /// repeat).
 [[nodiscard]] std::vector<FrozenRows> frozen_rows(std::span<const TargetObservation> observations,
                                                   std::span<const RigHead> heads, const FollowConfig& config);
 
-/// Whether each observation is one of them; empty where there are none.
+/// Whether each observation is one of them; empty if there are none.
 [[nodiscard]] std::vector<bool> rows_of(std::span<const FrozenRows> frozen,
                                         std::span<const TargetObservation> observations);
 

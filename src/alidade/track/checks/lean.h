@@ -7,23 +7,23 @@
 
 namespace alidade {
 
-/// The lean of one head's innovations that no noise explains, and what usually does it.
+/// A bias of one head's innovations that no noise explains, and its usual cause.
 struct Lean {
   std::string text;
   double size = 0.0;  ///< In σ; 0: none.
 };
 
-/// Means of innovations that are smaller are no lean.
+/// Means of innovations below this are not a bias.
 inline constexpr double min_mean_lean = 0.4;
 
-/// The largest lean of all heads.
+/// The largest bias of all heads.
 [[nodiscard]] Lean worst_lean(const TrackReport& report, std::span<const RigHead> heads);
 
-/// NIS a degree of freedom that is good, and that is still a track.
+/// NIS per degree of freedom: limits of a good track, and of an acceptable one.
 inline constexpr double good_nis_high = 1.5, max_nis = 3.0;
 
-/// How large the innovations are. Smaller noise than what was supposed for want of a σ makes every σ too wide: no
-/// doubt.
+/// The size of the innovations. Noise smaller than the default assumed without a σ only makes every σ too large: no
+/// reason for doubt.
 [[nodiscard]] Check nis_check(const TrackReport& report, bool is_stated);
 
 }  // namespace alidade

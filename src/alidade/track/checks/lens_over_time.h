@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// An observation of which a head's history of intrinsics says nothing: more than `beyond_s` outside what it spans.
+/// An observation not covered by its head's history of intrinsics: more than `beyond_s` outside its time span.
 struct OutsideHistory {
   std::size_t head = 0;
   double t_s = 0.0;
@@ -17,9 +17,9 @@ struct OutsideHistory {
                                                             std::span<const IntrinsicsHistory> histories,
                                                             double beyond_s);
 
-/// Gives each observation the intrinsics of its capture, and the rig's lenses the errors that these have: as an
-/// observer's errors last, they are considered as persistent errors that change in size only. Heads without a history
-/// keep their own.
+/// Gives each observation the intrinsics of its capture time, and the rig's lenses the corresponding errors: since the
+/// errors of an observer are correlated in time, they are considered as constant errors of varying size. Heads without
+/// a history keep their own.
 void use_intrinsics_histories(std::span<const IntrinsicsHistory> histories,
                               std::vector<TargetObservation>& observations, Rig& rig);
 

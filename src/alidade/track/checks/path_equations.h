@@ -12,22 +12,22 @@ namespace alidade {
 /// Position and velocity of the target at each observation.
 using TargetPath = std::vector<Eigen::Vector<double, 6>>;
 
-/// What observations say of the parameters p of all heads (the rows of each one's RigUncertainty::factor, one head
-/// after the other), linearised along one path, the path eliminated: −2 ln p = cost − 2 gᵀ p + pᵀ information p.
+/// Information of the observations about the parameters p of all heads (the rows of each RigUncertainty::factor, head
+/// by head), linearised along one path, the path eliminated: −2 ln p = cost − 2 gᵀ p + pᵀ information p.
 struct PathEquations {
   Eigen::MatrixXd information;
   Eigen::VectorXd g;
-  Eigen::VectorXd seen;        ///< The diagonal of the information if the path were known.
+  Eigen::VectorXd seen;        ///< Diagonal of the information if the path were known.
   double cost = 0.0;           ///< At p = 0.
-  double expected_cost = 0.0;  ///< Of a right rig, the noise being as stated and the path smooth.
+  double expected_cost = 0.0;  ///< For a correct rig, with the stated noise and a smooth path.
 };
 
-/// The path of the model cv by the tracker's σ_a that suits the observations best, which are in order of capture; it
-/// begins with where their rays meet. None where too few of them do.
+/// The most probable path of model cv with the tracker's σ_a for these observations, which are in order of capture; the
+/// initial path is the intersection of their rays. None if too few of them intersect.
 [[nodiscard]] std::optional<TargetPath> smooth_path(std::span<const TargetObservation> observations,
                                                     std::span<const RigHead> heads, const TrackerConfig& config);
 
-/// About that path the target may go anywhere: its velocity changes by white noise of a σ_a of `free_m_s2`.
+/// The target may deviate from that path: its velocity changes by white noise of intensity σ_a `free_m_s2`.
 [[nodiscard]] PathEquations path_equations(std::span<const TargetObservation> observations,
                                            std::span<const RigHead> heads,
                                            std::span<const Eigen::Vector<double, 6>> path, const TrackerConfig& config,

@@ -8,30 +8,30 @@
 
 namespace alidade {
 
-/// A fault is one that is more significant: of a right rig, whose z are normal, with some fifteen of the parameters
-/// independent, one track in 150 has such a one. Where the rig's errors are not given, only those of chance.
+/// Threshold for a fault: with a correct rig, whose z are standard normal, and some fifteen independent parameters, one
+/// track in 150 exceeds it. If the rig's errors are not given, chance alone is compared.
 [[nodiscard]] inline double max_fault_z(const TrackReport& report) { return report.errors_are_counted ? 3.5 : 5.0; }
 
-/// Of what is tested the faults, the most significant first, and the power.
+/// The faults, the most significant first, and the power of the tests.
 struct RigTests {
   std::vector<RigFault> faults;
   std::vector<RigPower> power;
 };
 
-/// Tests each parameter of each head alone: what the observations would gain if it were free beside what the rig file
-/// allows (score test: C. R. Rao, 1948). They are in order of capture, and linearised along one path, about which the
-/// target may go anywhere. Empty where they determine no path.
+/// Tests each parameter of each head on its own: the gain if it were free beyond what the rig file
+/// allows (score test: C. R. Rao, 1948). The observations are in order of capture, and linearised along one path, from
+/// which the target may deviate anywhere. Empty if they determine no path.
 [[nodiscard]] RigTests rig_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                   const TrackerConfig& config);
 
-/// Whether a fault explains the observations as well as the first, by the score test or refitted: of so much ln p a
-/// choice may err once in 20.
+/// Whether a fault explains the observations as well as the first, by the score test or re-estimated: with this
+/// difference of ln p the choice may be wrong once in 20.
 [[nodiscard]] bool is_alike(const RigFault& first, const RigFault& fault);
 
-/// The first fault, if it is significant, and of each head the first of those that explain the observations as well.
+/// The first fault, if it is significant, and for each head the first of those that explain the observations as well.
 [[nodiscard]] std::vector<RigFault> alike_per_head(const TrackReport& report);
 
-/// The rig without the fault, and the observations at the times that they then have.
+/// The rig with the fault corrected, and the observations with the corresponding times.
 struct WithoutFault {
   std::vector<RigHead> heads;
   std::vector<TargetObservation> observations;
@@ -39,13 +39,13 @@ struct WithoutFault {
 [[nodiscard]] WithoutFault without_fault(std::span<const TargetObservation> observations,
                                          std::span<const RigHead> heads, const RigFault& fault);
 
-/// Of each head the most significant parameter that is not its clock's, if it may explain what a clock would.
+/// For each head the most significant parameter other than its clock, if it may explain what a clock would.
 [[nodiscard]] std::vector<RigFault> rivals_of_clocks(const TrackReport& report);
 
-/// Where one parameter of the rig explains what does not fit, no one looks for other reasons.
+/// Whether one parameter of the rig explains the misfit, so that no other cause is searched for.
 [[nodiscard]] bool is_explained_by_fault(const TrackReport& report);
 
-/// Where there is a fault: increases σ by what it moves, and determines whether the observations fit without it.
+/// If there is a fault: increases σ by its effect, and determines whether the observations fit once it is corrected.
 void heed_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                  const FollowConfig& config, TrackReport& report);
 

@@ -9,20 +9,20 @@
 
 namespace alidade {
 
-/// How far the target moves for an error of a parameter: a share of its range, RMS over the track.
+/// Motion of the target for an error of a parameter: relative to its range, RMS over the track.
 struct TargetMove {
   std::string name;    ///< "head2.pan_zero_rad"
-  std::string error;   ///< "0.1°", "1 %": how large the error is.
-  double share = 0.0;  ///< Of the range.
+  std::string error;   ///< "0.1°", "1 %": the size of the error.
+  double share = 0.0;  ///< Relative to the range.
 };
 
-/// Errors of the rig that may move the target by more than 5σ where half of its positions are nearer, and that the
-/// observations then show in half of all logs at most (RigPower): no verdict tests them.
+/// Errors of the rig that may move the target by more than 5σ at half of its positions, and that the
+/// observations would reveal in half of all logs at most (RigPower): no verdict tests them.
 struct UnseenErrors {
   std::vector<const RigPower*> params;  ///< Of TrackReport::power.
-  std::vector<TargetMove> worst;        ///< Of each kind (angles, f, centre, positions, scales, clocks) the worst.
-  double range_m = 0.0;                 ///< From the first head, the median.
-  /// What the rig file lets them move: a share of the range, and in the track's σ. None where it does not say.
+  std::vector<TargetMove> worst;        ///< The worst one of each kind (angles, f, centre, positions, scales, clocks).
+  double range_m = 0.0;                 ///< Median range from the first head.
+  /// Effect of the errors that the rig file allows, relative to the range and in the track's σ. None if it has none.
   std::optional<double> sigma_share, sigma_in_sigma;
 };
 

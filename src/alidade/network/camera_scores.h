@@ -13,22 +13,22 @@ namespace alidade {
 
 inline constexpr int num_camera_parts = 10;
 
-/// Derivative of an observation by what is tested of its camera, in the order of CameraPart [px]; by its clock 0 where
-/// clocks are free.
+/// Derivative of an observation with respect to the tested parts of its camera, in the order of CameraPart [px]; 0 for
+/// its clock if clocks are free.
 [[nodiscard]] Eigen::Matrix<double, 2, num_camera_parts> J_px_parts(const MovingProblem& problem,
                                                                     const MovingState& state,
                                                                     std::span<const TurnedHead> turned,
                                                                     const SolvedObservation& observation,
                                                                     const PathSpline::Support& at);
 
-/// What the residuals would gain if a part of one camera were free: score tests, one linearisation, poses,
+/// Score tests: the gain in the residuals if a part of one camera were free, by one linearisation, poses,
 /// clocks and path following. `wide`: the system at the solution, solved without damping, with num_camera_parts columns
-/// for each placed head behind the shared parameters. Scores scatter over blocks of time, about what the freed one
-/// leaves. What errors of the files, as these state them, do to each is `given`.
+/// for each placed head after the shared parameters. The scatter of scores is over blocks of time, about what the freed
+/// part leaves. `given`: effect of the files' errors, as these state them.
 [[nodiscard]] std::vector<CameraScore> camera_scores(const MovingProblem& problem, const SolvedMoving& solved,
                                                      const PathSystem& wide);
 
-/// Place of a part among the parameters of its lens; none: it has no such.
+/// Index of a part among the parameters of its lens; none if the lens does not have it.
 [[nodiscard]] std::optional<Eigen::Index> lens_param_of(const Camera& camera, CameraPart part);
 
 }  // namespace alidade

@@ -10,21 +10,21 @@
 
 namespace alidade {
 
-/// Two cameras whose observations agree when the second's clock is read so much later than the first's.
+/// Two cameras whose observations agree if the second's clock is offset from the first's by this.
 struct ObservationPair {
   std::size_t first = 0, second = 0;
-  double offset_s = 0.0;  ///< Time of the second − time of the first, of one moment.
-  double share = 0.0;     ///< Of the common observations that agree.
+  double offset_s = 0.0;  ///< Time of the second − time of the first, at the same moment.
+  double share = 0.0;     ///< Fraction of the common observations that agree.
   std::size_t num_common = 0;
 };
 
-/// The offset within ± search_s at which the most common observations have one epipolar geometry, to a step of 0.05 s;
-/// none without enough common observations. search_s 0: the clocks are one. Throws Interrupted.
+/// The offset within ± search_s at which the most common observations fit one epipolar geometry, in steps of 0.05 s;
+/// none without enough common observations. search_s 0: one common clock. Throws Interrupted.
 [[nodiscard]] std::optional<ObservationPair> agreeing_offset(std::span<const ObservationSeries> series,
                                                              std::size_t first, std::size_t second, double search_s,
                                                              const Progress& progress);
 
-/// cam_from_cam(second, first), translation of length 1, and where the target was (time of the first, point in the
+/// cam_from_cam(second, first), translation of length 1, and the target's positions (time of the first, point in the
 /// first camera). By agreeing_essential().
 struct RelativePose {
   Rigid3 cam_from_first;
@@ -40,7 +40,7 @@ struct Resection {
   double share = 0.0;
   std::size_t num_common = 0;
 };
-/// `rate`: of the camera's clock by that of the points, about the midpoint of the points' times.
+/// `rate`: of the camera's clock relative to that of the points, about the midpoint of the points' times.
 [[nodiscard]] std::optional<Resection> resection(const ObservationSeries& camera, std::span<const double> t_s,
                                                  std::span<const Eigen::Vector3d> point_in_world, double offset_s,
                                                  double rate);

@@ -11,19 +11,19 @@
 
 namespace alidade {
 
-/// What was given to locate the cameras: lenses and a distance, with their effect on the result.
+/// Given quantities behind the cameras' poses, lenses and a distance, with their effect on the result.
 struct MovingGiven {
-  std::vector<Assumption> assumed;  ///< Moves in σ of `cov`, of the cameras' poses.
-  /// Of the shared parameters: the solver's, lenses whose covariance is given, and focal lengths that the observations
-  /// contradict, but not significantly.
+  std::vector<Assumption> assumed;  ///< `moves` in σ of `cov`, of the cameras' poses.
+  /// Of the shared parameters: from the solver, from lenses with a given covariance, and from focal lengths that the
+  /// observations contradict, though not significantly.
   Eigen::MatrixXd cov;
   std::vector<CameraScore> scores;
 };
 [[nodiscard]] MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved,
                                        const MovingTargetConfig& config);
 
-/// Fills in the report's covariance of the heads, which stand in their world already: with that of the similarity,
-/// where a true path gave it (`match`; else nullptr), and the worst camera's σ in the frame of the reference.
+/// Fills in the report's covariance of the heads, which are already in their world: including that of the similarity,
+/// if a true path gave it (`match`; else nullptr), and the worst camera's σ in the frame of the reference.
 void take_covariance(const MovingProblem& problem, const MovingGiven& given, const Eigen::MatrixXd& cov_model,
                      const PathMatch* match, MovingTargetReport& report);
 

@@ -8,10 +8,10 @@
 namespace alidade {
 
 /// Poses and clocks of static cameras from their observations of one moving target:
-/// relative poses of pairs over the clocks' differences, then all cameras and the path (a cubic spline) together by
-/// maximum likelihood. The world is the first camera's, or with a true path that path's, brought there by a similarity
-/// alone. Readings of a head are what they are throughout (its encoder's zero). Does not throw on bad data: the report
-/// says how it went. docs/maths/fixed-cameras.md. Throws Interrupted.
+/// relative poses of pairs for all clock offsets, then all cameras and the path (a cubic spline) jointly by
+/// maximum likelihood. The world is the first camera's, or with a true path that path's, registered by a similarity
+/// only. Readings of a head are constant (its encoder's zero). Does not throw because of bad data: see the status of
+/// the report. docs/maths/fixed-cameras.md. Throws Interrupted.
 [[nodiscard]] MovingTargetReport place_cameras(std::span<const TargetObservation> observations,
                                                std::span<const RigHead> heads, const MovingTargetConfig& config,
                                                const TrueTrack& truth = {}, const Progress& progress = {});

@@ -6,14 +6,14 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/localize/frames/image_localizer.h"
 
-// A board's corners look alike: by their surroundings one may be taken for its neighbour along the diagonal, and all
-// of them together for a board that is elsewhere.
+// The corners of a board look alike: by its surroundings, one may be confused with its diagonal neighbour, and all
+// together with a displaced board.
 
 namespace alidade {
 
-/// Whether the regions that its corners are looked for in reach half-way to the nearest other corner.
+/// Whether the search regions of corners reach half-way to the nearest other corner.
 bool ImageLocalizer::may_mistake_corners() const {
-  constexpr double sigmas = 3.0;  // as far as a patch is looked for
+  constexpr double sigmas = 3.0;  // radius of the search for a patch
   std::vector<Eigen::Vector2d> px;
   std::vector<double> reach_px;
   for (const KnownPoint& point : given_) {
@@ -33,20 +33,20 @@ bool ImageLocalizer::may_mistake_corners() const {
   return median_of(std::move(reach_px)) > 0.5 * median_of(std::move(apart_px));
 }
 
-/// The target in this image, which is searched once.
+/// The target in this image, detected once.
 const std::optional<SeenTarget>& ImageLocalizer::target_now(const cv::Mat& smoothed) {
   if (!seen_now_) seen_now_ = seen_target(smoothed);
   return *seen_now_;
 }
 
-/// Its corners as the whole board is found, where a single one may be mistaken. None: each by its surroundings.
+/// Its corners as detected on the whole board, if single ones may be confused. Null: search each by its surroundings.
 const std::vector<FeatureObservation>* ImageLocalizer::corners_of_board(const cv::Mat& smoothed) {
   if (!config_.target.board || !may_mistake_corners()) return nullptr;
   const std::optional<SeenTarget>& seen = target_now(smoothed);
   return seen ? &seen->observations : nullptr;
 }
 
-/// `tried_` and `in_view_` end with this corner, expected there.
+/// Completes the last entries of `tried_` and `in_view_`, which are for this corner.
 void ImageLocalizer::take_corner(const std::vector<FeatureObservation>& corners,
                                  std::vector<FeatureObservation>& observations) {
   const auto found = std::ranges::find(corners, tried_.back().id, &FeatureObservation::id);

@@ -10,17 +10,17 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t min_tracked = 5;  // a pose has six components, a point two; two points more to notice a mistake
-constexpr double min_share = 0.25;      // of the features looked for: fewer may be chance
-constexpr double prior_share = 0.5;     // σ of a new inverse depth over it: from half the depth to infinity
+constexpr std::size_t min_tracked = 5;  // three points determine a pose; two more reveal a mistake
+constexpr double min_share = 0.25;      // of the searched features: fewer may be chance
+constexpr double prior_share = 0.5;     // relative σ of a new inverse depth: from half the depth to infinity
 
 }  // namespace
 
 LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigma_floor_px) {
-  constexpr double few_doubtful = 0.1;  // the gates alone keep them out; a consensus costs as much as the update
+  constexpr double few_doubtful = 0.1;  // so few the gates alone reject; a consensus costs as much as the update
   if (!(config.sigma_new_px > 0.0)) config.sigma_new_px = sigma_floor_px;
-  // Many matches settle the first frames' poses: errors may rotate with the world there too, and must not follow one
-  // side.
+  // Many matches determine the first frames' poses: world rotation errors are admissible there, too, and must not
+  // become asymmetric.
   config.max_rotation_rad = std::max(config.max_rotation_rad, 0.05);
   config.curvature_tolerance = std::min(config.curvature_tolerance, 0.001);
   config.consensus_above = std::max(config.consensus_above, few_doubtful);
@@ -39,7 +39,7 @@ void ImageLocalizer::forget(long id) {
   landmarks_.erase(id);
 }
 
-/// With tens of features the valley that FilterBank splits the speed for is gone after a frame; both poses stay.
+/// With tens of features the curved valley for which FilterBank splits speeds is gone after one frame; both poses stay.
 void ImageLocalizer::begin_at(std::span<const StartHypothesis> starts) {
   FilterBankConfig bank = config_.bank;
   bank.splits = 1;
@@ -47,13 +47,13 @@ void ImageLocalizer::begin_at(std::span<const StartHypothesis> starts) {
   record_.begin(num_taken_);
 }
 
-/// None where there is no target.
+/// Empty without a target.
 std::optional<SeenTarget> ImageLocalizer::seen_target(const cv::Mat& smoothed) const {
   if (config_.target.points.empty()) return std::nullopt;
   return find_target(smoothed, engine_.camera(), config_.target, engine_.pose_config());
 }
 
-/// From the start that was given, or the target; without both the first camera is the world.
+/// Starts from the given start or from the target; without both, the first camera defines the world frame.
 bool ImageLocalizer::start(const cv::Mat& smoothed) {
   if (config_.map) return start_in_map(smoothed);
   const std::optional<SeenTarget>& seen = target_now(smoothed);
@@ -71,8 +71,8 @@ bool ImageLocalizer::start(const cv::Mat& smoothed) {
   return seen || num_found_now_ >= min_tracked;
 }
 
-/// What is looked for later is what surrounds the corner as found, not the corner itself: where that is in the world is
-/// as unsure as the corner was found.
+/// Later searches look for the corner's surroundings as found, not for the corner itself: the position of these in the
+/// world is as uncertain as the corner's detection.
 std::vector<KnownPoint> ImageLocalizer::given_points(const SeenTarget& seen) const {
   std::vector<KnownPoint> given = config_.target.points;
   for (KnownPoint& point : given) {
@@ -85,7 +85,7 @@ std::vector<KnownPoint> ImageLocalizer::given_points(const SeenTarget& seen) con
   return given;
 }
 
-/// Its points enter the map, and their surroundings as they look now are what they are found by.
+/// Adds its points to the map, with patches of their current surroundings to find them again.
 void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen) {
   const std::vector<KnownPoint>& points = config_.target.points;
   given_ = given_points(seen);
@@ -114,7 +114,7 @@ void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen)
   }
 }
 
-/// The period is the least gap so far: images may be missing.
+/// The period is the smallest gap so far: images may be missing.
 void ImageLocalizer::predict_to(double t_s) {
   const double gap_s = t_s - t_s_;
   if (!(period_s_ > 0.0) || gap_s < period_s_) period_s_ = gap_s;
@@ -194,7 +194,7 @@ void ImageLocalizer::drop_bad() {
   }
 }
 
-/// As deep as the points of the map that are known well, in the median.
+/// Median depth of the well-known points of the map.
 double ImageLocalizer::usual_depth_m() const {
   const LocalizationFilter& filter = engine_.best();
   if (config_.depth_m) return *config_.depth_m;
@@ -204,11 +204,11 @@ double ImageLocalizer::usual_depth_m() const {
     const double depth = (cam_from_world * place_of(feature).point_in_world).z();
     if (depth > 0.0 && feature.kind == FeatureKind::xyz) depths.push_back(depth);
   }
-  if (depths.empty()) return 1.0;  // a world without scale: its first points are one unit away
+  if (depths.empty()) return 1.0;  // world of unknown scale: the first points are one unit away
   return median_of(std::move(depths));
 }
 
-/// Where the map is full, what has not been seen for longest leaves.
+/// If the map is full, removes the landmark that was not seen for the longest time.
 bool ImageLocalizer::make_room() {
   if (landmarks_.size() < static_cast<std::size_t>(config_.features.max_features)) return true;
   const Landmark* oldest = nullptr;
@@ -259,8 +259,8 @@ bool ImageLocalizer::add_landmark(const cv::Mat& smoothed, const Eigen::Vector2d
   return true;
 }
 
-/// From a pose where the camera may be: a wide search, an update of the filter, and a second look that has to find
-/// most of what is expected then, where it is expected.
+/// Tries a possible pose of the camera: a wide search, an update of the filter, and a second search that must find most
+/// of the features where they are then predicted.
 bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& from, PathStep& step) {
   engine_.filters().restart({{from}});
   enter_saved();
@@ -281,8 +281,8 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
   return true;
 }
 
-/// Where the observations of several images in a row contradict the path though they are found: from the target or a
-/// keyframe, if that explains this image.
+/// If the observations of several images in a row contradict the path although they are found, restarts from the target
+/// or a keyframe, if that explains this image.
 bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
   const Doubt doubt = config_.restarts ? engine_.doubt_after(step) : Doubt::none;
   if (doubt != Doubt::strong && doubt != Doubt::many) return false;
@@ -293,10 +293,10 @@ bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
   return false;
 }
 
-/// The positions of the keyframes that are most like the image.
+/// The poses of the keyframes most similar to the image.
 std::vector<StartHypothesis> ImageLocalizer::likely_places(const cv::Mat& smoothed, double depth_m) const {
   std::vector<StartHypothesis> starts;
-  constexpr double sigma_share = 0.15, sigma_rad = 0.08;  // of what a keyframe's pose is off by
+  constexpr double sigma_share = 0.15, sigma_rad = 0.08;  // of a keyframe's pose as a guess
   for (const Rigid3& world_from_cam : keyframes_.candidates(smoothed, engine_.camera(), 4)) {
     StartHypothesis start;
     start.motion.world_from_cam = world_from_cam;
@@ -320,10 +320,10 @@ bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
   return false;
 }
 
-/// An image after the first of the path.
+/// Processes an image after the first of the path.
 void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
   predict_to(step.t_s);
-  if (is_repeated_ && should_move()) {  // a stream that hangs: seen at another time
+  if (is_repeated_ && should_move()) {  // a frozen stream: taken at another time
     ++num_repeated_;
     tried_.clear();
     step.event = FrameEvent::predicted;

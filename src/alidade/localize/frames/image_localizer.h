@@ -13,27 +13,27 @@
 
 namespace alidade {
 
-/// A filter's configuration as images need it: tens of matches a frame, whose few mismatches the gates keep out, and
-/// features defined by a pixel that is found again to `sigma_floor_px`.
+/// Adapts a filter's configuration to images: tens of matches per frame, whose few mismatches the gates reject, and
+/// features whose defining pixel is found again to `sigma_floor_px`.
 [[nodiscard]] LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigma_floor_px);
 
-/// The front end for images: finds the features of the filter's map in each, chooses new ones, and finds the way back
-/// after it was lost.
+/// The front end for images: finds the features of the filter's map in each image, selects new ones, and relocalises
+/// the camera after it was lost.
 class ImageLocalizer {
  public:
-  /// `config` as resolved() gives it; it must live longer.
+  /// `config` as returned by resolved(); it must outlive this.
   ImageLocalizer(const Camera& camera, const LocalizeConfig& config);
 
   /// The next image, 8-bit grey of the camera's size.
   PathStep take(const cv::Mat& grey, long frame, double t_s);
-  /// `result` has the path; the rest is filled in, and the path smoothed.
+  /// `result` contains the path; the rest is filled in, and the path is smoothed.
   void sum_up(Localization& result) const;
-  /// What was matched in images, as it is kept for it, and the target's points by their numbers there.
+  /// The matches in images, as kept for smoothing, and the target's points with the ids used there.
   [[nodiscard]] const std::vector<ObservationFrame>& frames() const { return kept_.frames(); }
   [[nodiscard]] std::span<const KnownPoint> target() const { return given_; }
-  /// The map for another run to begin in: `result` as it is given.
+  /// Fills the map for use in a later run, from `result` as returned.
   void save_map(Localization& result) const;
-  /// Of the last image.
+  /// Searches in the last image.
   [[nodiscard]] std::span<const ObservationTried> tried() const { return tried_; }
 
  private:
@@ -57,13 +57,13 @@ class ImageLocalizer {
   void add_target(const cv::Mat& smoothed, const SeenTarget& seen);
   [[nodiscard]] std::vector<KnownPoint> given_points(const SeenTarget& seen) const;
   void predict_to(double t_s);
-  /// What of the map is found where it is expected; `tried_` says what was looked for.
+  /// Searches features of the map where they are predicted; `tried_` records each search.
   [[nodiscard]] std::vector<FeatureObservation> look(const cv::Mat& smoothed, const Search& search);
   [[nodiscard]] bool is_found(std::size_t num_found) const;
   void count(std::span<const FeatureObservation> observations, const ObservationsReport& report);
   void drop_bad();
   void add_new(const cv::Mat& smoothed);
-  /// Whether it entered.
+  /// Returns whether it was added.
   bool add_landmark(const cv::Mat& smoothed, const Eigen::Vector2d& px, double depth_m);
   void close_loop(const cv::Mat& smoothed, double usual_depth_m);
   void recognise(const cv::Mat& smoothed);
@@ -87,12 +87,12 @@ class ImageLocalizer {
   const LocalizeConfig& config_;
   std::unordered_map<long, Landmark> landmarks_;
   KeyframeStore keyframes_;
-  std::vector<KnownPoint> given_;  ///< The target's points, as the filter was given them.
+  std::vector<KnownPoint> given_;  ///< The target's points, as added to the filter.
   std::size_t num_alike_ = 1;
   [[nodiscard]] bool is_shown(const Eigen::Vector2d& px) const;
 
   ObservationRecord record_;
-  KeptFrames kept_;  ///< Where the path is smoothed.
+  KeptFrames kept_;  ///< Input of path smoothing.
   struct Gone {
     GonePoint point;
     Landmark landmark;
@@ -100,26 +100,26 @@ class ImageLocalizer {
   std::map<long, Gone> gone_;  ///< Points that left a full map.
   LandmarkDescriptions descriptions_;
   std::optional<Rigid3> last_described_;
-  std::map<long, long> number_of_;  ///< Of landmarks recognised: of which one of before.
-  std::map<long, long> latest_;     ///< By number: the landmark as it was recognised last.
+  std::map<long, long> number_of_;  ///< Recognised landmark → the original one.
+  std::map<long, long> latest_;     ///< Original landmark → its latest id.
   struct Saved {
     KnownPoint point;
     Landmark landmark;
   };
-  std::map<long, Saved> saved_;          ///< Of the map of an earlier run; those that are not found leave it.
-  std::vector<FeatureObservation> now_;  ///< What this image's pose is made of, and what was chosen in it.
-  std::size_t num_taken_ = 0;            ///< Images.
-  ImageMask shown_;                      ///< image_mask.h.
+  std::map<long, Saved> saved_;          ///< Of the map of an earlier run; those not found are removed.
+  std::vector<FeatureObservation> now_;  ///< Observations of this image's pose, and its new landmarks.
+  std::size_t num_taken_ = 0;            ///< Number of images.
+  ImageMask shown_;                      ///< See image_mask.h.
   bool lacks_circle_ = false;
   void mask(const cv::Mat& grey, const cv::Mat& smoothed);
   std::vector<std::uint8_t> last_image_;  ///< Row by row.
-  bool is_repeated_ = false;              ///< This image is the last one, byte for byte.
+  bool is_repeated_ = false;              ///< This image is identical to the last one.
   std::size_t num_repeated_ = 0;
   StillParts still_;
-  ImageMask given_mask_;                               ///< `shown_` without what stands still.
-  std::optional<std::optional<SeenTarget>> seen_now_;  ///< The target in this image, once it was looked for.
+  ImageMask given_mask_;                               ///< `shown_` without the mask of still parts.
+  std::optional<std::optional<SeenTarget>> seen_now_;  ///< The target in this image; empty: not searched yet.
   std::vector<ObservationTried> tried_;
-  std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this image.
+  std::vector<Eigen::Vector2d> in_view_;  ///< Pixels of landmarks found or predicted in this image.
   double t_s_ = 0.0, period_s_ = 0.0;
   long frame_ = 0, next_id_ = 0;
   std::size_t num_found_now_ = 0;

@@ -5,12 +5,12 @@
 #include "alidade/localize/frames/image_localizer.h"
 #include "alidade/localize/known_pose.h"
 
-// Landmarks that left the map are recognised where the camera comes back: the loop is closed at the end.
+// Recognition of landmarks that left the map, when the camera returns: the loop is closed at the end.
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t long_after = 100;  // images: a gap so short costs little to bridge, and drifts little
+constexpr std::size_t long_after = 100;  // images: shorter gaps are cheap to bridge and drift little
 constexpr std::size_t min_agreeing = 8, most_images = 3;
 
 struct Agreement {
@@ -18,8 +18,8 @@ struct Agreement {
   std::vector<std::size_t> agreeing;
 };
 
-/// The pose from which most of these points of the map are where they were seen, to `near_px`. None: fewer than eight,
-/// or than half.
+/// The pose from which most of these map points project within `near_px` of their observations. Empty: fewer than
+/// eight, or fewer than half.
 std::optional<Agreement> agreement(const Camera& camera, std::span<const LandmarkSeen> seen,
                                    std::span<const KnownPoint> known, double sigma_px, double near_px) {
   std::vector<FeatureObservation> observations;
@@ -40,7 +40,7 @@ std::optional<Agreement> agreement(const Camera& camera, std::span<const Landmar
 
 }  // namespace
 
-/// Of each place on the way an image is described, and compared with those of long before.
+/// Describes an image at each place along the way, and compares it with those of long before.
 void ImageLocalizer::close_loop(const cv::Mat& smoothed, double usual_depth_m) {
   if (!config_.smooths) return;
   const Rigid3& world_from_cam = engine_.best().motion().world_from_cam;
@@ -58,9 +58,9 @@ void ImageLocalizer::close_loop(const cv::Mat& smoothed, double usual_depth_m) {
   descriptions_.add(smoothed, num_taken_, seen);
 }
 
-/// Landmarks that left the map, where descriptors, then their positions and a pose, then their patches agree.
+/// Recognises landmarks that left the map: descriptors, then positions with a pose, then patches must agree.
 void ImageLocalizer::recognise(const cv::Mat& smoothed) {
-  constexpr double corner_px = 1.5, near_px = 6.0;  // a corner of a reduced image is off by a pixel or two
+  constexpr double corner_px = 1.5, near_px = 6.0;  // a corner of a downsampled image is off by a pixel or two
   for (const std::vector<LandmarkSeen>& matches :
        descriptions_.matches(smoothed, num_taken_ - long_after, min_agreeing, most_images)) {
     std::vector<LandmarkSeen> seen;
@@ -76,7 +76,7 @@ void ImageLocalizer::recognise(const cv::Mat& smoothed) {
   }
 }
 
-/// From a pose in the map as it was: what of it is where it should be enters again, as new landmarks. Whether it did.
+/// From a pose in the old map, re-enters those of its landmarks that are found, as new ones. Returns whether it did.
 bool ImageLocalizer::take_recognised(const cv::Mat& smoothed, const Rigid3& world_from_cam) {
   constexpr double around_px = 3.0, sigma_px = 0.5, near_px = 2.0, min_correlation = 0.85;
   const Camera& camera = engine_.camera();
@@ -107,7 +107,7 @@ bool ImageLocalizer::take_recognised(const cv::Mat& smoothed, const Rigid3& worl
   return true;
 }
 
-/// A landmark recognised, as a new one: the path has drifted meanwhile.
+/// A recognised landmark enters as a new one, as the path has drifted meanwhile.
 void ImageLocalizer::enter_again(const cv::Mat& smoothed, const LandmarkSeen& seen) {
   const auto before = number_of_.find(seen.id);
   const long number = before == number_of_.end() ? seen.id : before->second;

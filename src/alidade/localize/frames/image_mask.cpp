@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// Brighter than an eighth of the bright parts; single pixels of noise are none.
+/// Pixels brighter than an eighth of the bright parts, without isolated noise pixels.
 cv::Mat bright_part(const cv::Mat& grey) {
   std::vector<std::uint8_t> values(grey.begin<std::uint8_t>(), grey.end<std::uint8_t>());
   const auto bright = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 9 / 10);
@@ -19,9 +19,9 @@ cv::Mat bright_part(const cv::Mat& grey) {
   return opened;
 }
 
-/// Empty: what is bright is no circle, or all of the image.
+/// Empty: the bright part is not a circle, or is all of the image.
 cv::Mat circle_part(const cv::Mat& grey) {
-  constexpr double min_outside = 0.03, min_filled = 0.9;  // of the image; of what the circle has of it
+  constexpr double min_outside = 0.03, min_filled = 0.9;  // of the image; of the part of the circle in it
   std::vector<cv::Point> points;
   cv::findNonZero(bright_part(grey), points);
   if (points.empty()) return {};

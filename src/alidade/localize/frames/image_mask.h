@@ -8,14 +8,14 @@ class Mat;
 
 namespace alidade {
 
-/// Where a patch lies wholly where the scene is shown; of no size: everywhere.
+/// Mask of the positions at which a patch lies completely within the scene; size 0: everywhere.
 struct ShownPart {
   ImageMask mask;
-  bool lacks_circle = false;  ///< One was asked for, and `grey` shows none.
+  bool lacks_circle = false;  ///< A circle was requested, and `grey` shows none.
 };
 
-/// Of a circle the smallest around all that is not dark in `grey`: it is one where it leaves something of the image
-/// out, and is filled.
+/// For a circle, the smallest one around all that is not dark in `grey`: valid if it excludes part of the image and is
+/// filled.
 [[nodiscard]] ShownPart shown_part(const LocalizeConfig& config, const cv::Mat& grey, int margin_px);
 
 }  // namespace alidade

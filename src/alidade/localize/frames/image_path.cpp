@@ -4,11 +4,11 @@
 #include "alidade/localize/checks/summary.h"
 #include "alidade/localize/frames/image_localizer.h"
 
-// What comes of all images together.
+// Results from all images together.
 
 namespace alidade {
 
-/// A landmark leaves a full map: what it says of the path stays.
+/// Removes a landmark from a full map, but keeps its contribution to the path.
 void ImageLocalizer::let_go(long id) {
   const LocalizationFilter& filter = engine_.best();
   const auto place = filter.place(id);
@@ -32,7 +32,7 @@ Recording ImageLocalizer::recording() const {
   return recording;
 }
 
-/// Landmarks that a closed loop has made one are in the map once.
+/// Landmarks merged by a closed loop appear in the map once.
 void ImageLocalizer::leave_out_joined(const WholePath& whole, Localization& result) const {
   if (result.num_loops == 0) return;
   const std::vector<long>& solved = whole.smoothed.ids;
@@ -71,12 +71,12 @@ void ImageLocalizer::save_map(Localization& result) const {
     const Landmark& landmark = at != landmarks_.end() ? at->second : gone->second.landmark;
     const Rigid3& from =
         landmark.is_saved ? landmark.world_from_first_cam : result.path[landmark.first_step].world_from_cam;
-    constexpr double sure = 0.05;  // of the distance: what is vaguer would be looked for in the wrong position
+    constexpr double sure = 0.05;  // of the distance: less certain ones would be searched at the wrong position
     if (!(std::sqrt(point.cov.trace()) < sure * (point.point_in_world - from.translation).norm())) continue;
     map.points.push_back({point.id, point.point_in_world, point.cov_in_map.value_or(point.cov),
                           look_of(landmark, point.point_in_world, from)});
   }
-  for (const auto& [id, saved] : saved_)  // what of the earlier map was not seen this time
+  for (const auto& [id, saved] : saved_)  // points of the earlier map that were not seen this time
     if (std::ranges::find(map.points, id, &SavedPoint::id) == map.points.end())
       if (const auto at = std::ranges::find(config_.map->points, id, &SavedPoint::id); at != config_.map->points.end())
         map.points.push_back(*at);

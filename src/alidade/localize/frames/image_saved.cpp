@@ -6,7 +6,7 @@
 #include "alidade/localize/frames/image_localizer.h"
 #include "alidade/localize/frames/known_map.h"
 
-// The map of an earlier run: the path begins in it, and its points come into the filter where they should be seen.
+// The map of an earlier run: the path starts in it, and its points enter the filter where they should be visible.
 
 namespace alidade {
 
@@ -20,7 +20,7 @@ void ImageLocalizer::take_saved(const SavedMap& map) {
   for (const SavedKeyframe& keyframe : map.keyframes) keyframes_.add(keyframe);
 }
 
-/// Those that should be in the image and are not in the filter; for them the ones that were not found for long leave.
+/// Adds saved points that should be visible and are not in the filter; those not found for long make room.
 void ImageLocalizer::enter_saved() {
   if (saved_.empty()) return;
   constexpr long long_ago = 15;  // frames
@@ -56,7 +56,7 @@ void ImageLocalizer::enter_saved() {
   }
 }
 
-/// At the first keyframe from which the map is found in the image.
+/// Starts at the first keyframe from which the map is found in the image.
 bool ImageLocalizer::start_in_map(const cv::Mat& smoothed) {
   std::vector<double> depths;
   for (const auto& [id, saved] : saved_) depths.push_back(saved.landmark.first_distance_m);

@@ -19,10 +19,10 @@ bool ImageLocalizer::is_shown(const Eigen::Vector2d& px) const {
                       static_cast<std::size_t>(u)] != 0;
 }
 
-/// Whether it is the last image, byte for byte: no camera takes two with the same noise.
+/// Whether the image is identical to the last one: no camera takes two with the same noise.
 bool ImageLocalizer::shows_last(const cv::Mat& grey) {
   const auto bytes = static_cast<std::size_t>(grey.cols);
-  bool is_same = last_image_.size() == bytes * static_cast<std::size_t>(grey.rows);  // of one camera: one width
+  bool is_same = last_image_.size() == bytes * static_cast<std::size_t>(grey.rows);  // same camera: same width
   const auto kept = [&](int v) { return last_image_.data() + bytes * static_cast<std::size_t>(v); };
   for (int v = 0; is_same && v < grey.rows; ++v) is_same = std::memcmp(grey.ptr(v), kept(v), bytes) == 0;
   if (is_same) return true;
@@ -31,8 +31,8 @@ bool ImageLocalizer::shows_last(const cv::Mat& grey) {
   return false;
 }
 
-/// Whether what was found in the last image is expected elsewhere now. A camera that stands still in a scene without
-/// noise gives the same image, too.
+/// Whether the features found in the last image are now predicted elsewhere. A camera that stands still in a noiseless
+/// scene also repeats its image.
 bool ImageLocalizer::should_move() const {
   constexpr double still_px = 0.3;
   std::vector<double> moved_px;
@@ -43,8 +43,8 @@ bool ImageLocalizer::should_move() const {
   return !moved_px.empty() && median_of(std::move(moved_px)) > still_px;
 }
 
-/// The mask that is given, or the circle of the first image that shows one; without what stands still. What was found
-/// last where nothing moves was no point of the scene.
+/// Updates the mask: the given one, or the circle of the first image that shows one; without still parts. Removes
+/// landmarks last found in still parts: they are not points of the scene.
 void ImageLocalizer::mask(const cv::Mat& grey, const cv::Mat& smoothed) {
   constexpr int margin_px = PatchView::half_px + 2;
   if (given_mask_.shows.empty()) {

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr double max_chi2_per_dof = 6.9;  // 99.9 % of the two components that four corners leave
+constexpr double max_chi2_per_dof = 6.9;  // 99.9 % of the two degrees of freedom of four corners
 
 int dof_of(std::size_t num_points) { return 2 * static_cast<int>(num_points) - 6; }
 
@@ -23,7 +23,7 @@ std::optional<SeenTarget> posed(const Camera& camera, std::vector<FeatureObserva
   return seen;
 }
 
-/// Of the ways to number the corners those in which x points to the right; the one that fits best.
+/// Of the possible corner orders, those with x pointing to the right; returns the one that fits best.
 std::optional<SeenTarget> posed_rectangle(const Camera& camera, const SeenRectangle& rectangle,
                                           const LocalizeTarget& target, const KnownPoseConfig& config) {
   std::optional<SeenTarget> best;
@@ -49,7 +49,7 @@ std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& came
     double score, size_px;
   };
   std::vector<Candidate> candidates;
-  constexpr double paper_sigma = 5.0;  // what print, light and noise scatter inside
+  constexpr double paper_sigma = 5.0;  // scatter of print, light and noise inside
   for (const SeenRectangle& rectangle : find_rectangles(grey, camera)) {
     auto seen = posed_rectangle(camera, rectangle, target, config);
     if (!seen) continue;
@@ -78,13 +78,13 @@ std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& c
   return posed(camera, std::move(observations), target, config);
 }
 
-/// Where the top of a parabola through three neighbours is, from the central one.
+/// Vertex of the parabola through three neighbours, relative to the central one.
 double top_of(double before, double at, double after) {
   const double bend = before - 2.0 * at + after;
   return bend < 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
 }
 
-/// Each patch where the image is most like it.
+/// Locates each patch where the image correlates best with it.
 std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera, const LocalizeTarget& target,
                                        const KnownPoseConfig& config) {
   constexpr double min_correlation = 0.75;

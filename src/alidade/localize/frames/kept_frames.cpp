@@ -10,7 +10,7 @@ namespace {
 
 using PoseMatrix = Eigen::Matrix<double, 6, 6>;
 
-/// Whether the filter followed the camera from one frame to another: it was not reinitialised meanwhile.
+/// Whether the filter tracked the camera from one frame to another, without a restart.
 bool is_followed(std::span<const PathStep> path, std::size_t from, std::size_t to) {
   for (std::size_t k = from; k <= to; ++k) {
     if (!path[k].has_pose()) return false;
@@ -19,7 +19,7 @@ bool is_followed(std::span<const PathStep> path, std::size_t from, std::size_t t
   return true;
 }
 
-/// `share` of the way from one pose to another, and what is known of it.
+/// Interpolates pose and covariance, at `share` of the way from one pose to another.
 void put_between(const PathStep& a, const PathStep& b, double share, PathStep& step) {
   Eigen::Vector<double, 6> difference;  // in the first one's camera
   difference.head<3>() =
@@ -79,7 +79,7 @@ KeptFrames KeptFrames::every(std::size_t num, std::span<const KnownPoint> alone)
 
 void KeptFrames::put_back(std::span<const PathStep> solved, std::vector<PathStep>& path) const {
   const std::vector<PathStep> followed = path;
-  const auto moved = [&](std::size_t kept, std::size_t to) {  // as the filter went from a kept frame
+  const auto moved = [&](std::size_t kept, std::size_t to) {  // follows the filter's motion from a kept frame
     PathStep step = solved[kept];
     step.world_from_cam =
         step.world_from_cam * (followed[kept * stride_].world_from_cam.inverse() * followed[to].world_from_cam);
@@ -106,7 +106,7 @@ void KeptFrames::put_back(std::span<const PathStep> solved, std::vector<PathStep
       const PathStep step = moved(from_a ? a : b, k);
       path[k].world_from_cam = step.world_from_cam;
       path[k].cov = step.cov;
-    } else {  // the filter lost it in between: only its neighbours determine it
+    } else {  // lost by the filter in between: only its neighbours determine it
       const PathStep& after = solved[b < solved.size() ? b : a];
       put_between(solved[a].has_pose() ? solved[a] : after, after, 0.5, path[k]);
     }

@@ -10,27 +10,27 @@
 
 namespace alidade {
 
-/// The frames that are solved for together at the end: all; once there are more than `most`, every second, fourth, …,
-/// so that memory and the time at the end do not grow with the recording.
+/// The frames that are solved together at the end: all; beyond `most`, every second, fourth, …, so that memory and the
+/// time at the end do not grow with the recording.
 class KeptFrames {
  public:
   explicit KeptFrames(std::size_t most) : max_(most) {}
 
   void add(ObservationFrame frame);
   [[nodiscard]] const std::vector<ObservationFrame>& frames() const { return frames_; }
-  /// One of so many is kept, the first among them.
+  /// One in this many frames is kept, the first among them.
   [[nodiscard]] std::size_t stride() const { return stride_; }
-  /// Of a frame of the recording: the first one kept from there on; the last one kept where there is none.
+  /// Index of the first kept frame at or after a frame of the recording; that of the last one, if there is none.
   [[nodiscard]] std::size_t index_of(std::size_t frame) const;
-  /// The steps of a path that are of frames kept.
+  /// The steps of a path at kept frames.
   [[nodiscard]] std::vector<PathStep> steps(std::span<const PathStep> path) const;
-  /// The poses of `path`, which the filter followed, where those kept are `solved`: between two of them as the filter
-  /// went, with what that is off at the second one shared out over the time between.
+  /// Replaces the filter's path by the solved poses of kept frames: between two of them it follows the filter's motion,
+  /// and the difference at the second one is distributed over the time between.
   void put_back(std::span<const PathStep> solved, std::vector<PathStep>& path) const;
-  /// Means over stretches of `num_each` of these frames, of a camera that stands still: between two of them it is where
-  /// they say, and not where a filter went.
+  /// Means over intervals of `num_each` of these frames, for a camera that stands still: between two of them, poses are
+  /// interpolated and do not follow the filter.
   [[nodiscard]] KeptFrames averaged(std::vector<ObservationFrame> means, std::size_t num_each) const;
-  /// One of so many of these; with the observations of known points alone where some are given.
+  /// Every `num`-th of these; only with the observations of known points, if `alone` is not empty.
   [[nodiscard]] KeptFrames every(std::size_t num, std::span<const KnownPoint> alone) const;
 
  private:

@@ -7,11 +7,11 @@
 
 namespace alidade {
 
-/// Of a saved map's points so many are in the filter at once.
+/// Maximum number of points of a saved map in the filter at once.
 inline constexpr std::size_t max_saved_at_once = 60;
 
-/// The points of a map as known ones, each with the σ of its least certain direction; without those far less certain
-/// than most.
+/// The points of a map as known points, each with the σ of its least certain direction; without those that are far less
+/// certain than most.
 [[nodiscard]] std::vector<KnownPoint> known_points(const SavedMap& map);
 
 }  // namespace alidade

@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-/// J Rᵀ B: how the pixel moves with the point along its surface.
+/// J Rᵀ B: derivative of the pixel with respect to the point's position along its surface.
 std::optional<Eigen::Matrix2d> J_px_surface(const Camera& camera, const Rigid3& world_from_cam,
                                             const Eigen::Vector3d& point_in_world,
                                             const Eigen::Matrix<double, 3, 2>& surface_in_world) {
@@ -48,7 +48,7 @@ std::optional<Eigen::Matrix2d> here_from_first(const Landmark& landmark, const C
                                                const Rigid3& world_from_cam, const Eigen::Vector3d& point_in_world) {
   const auto J = J_px_surface(camera, world_from_cam, point_in_world, landmark.surface_in_world);
   if (!J) return std::nullopt;
-  // On its first ray the derivatives there go with one over the distance, which is known better by now.
+  // Derivatives at the first view scale with 1/distance, and the distance is known better now.
   const double distance_m = (point_in_world - landmark.world_from_first_cam.translation).norm();
   return *J * landmark.J_first_px_surface.inverse() * (distance_m / landmark.first_distance_m);
 }

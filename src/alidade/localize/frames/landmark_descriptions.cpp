@@ -11,8 +11,8 @@ namespace {
 
 constexpr int num_levels = 5, num_corners = 700, edge_px = 19, patch_px = 31, fast_threshold = 12;
 constexpr float level_scale = 1.2F;
-constexpr std::array<int, 2> described_levels{0, 3};  // a landmark is found from 0.6 to 2 times the distance
-/// Of 256: descriptors of different points differ by 128, give or take 20 or so.
+constexpr std::array<int, 2> described_levels{0, 3};  // landmarks are found at 0.6 to 2 times the distance
+/// Of 256 bits: descriptors of different points differ in 128 ± 20 bits or so.
 constexpr int max_differing = 56;
 
 cv::Ptr<cv::ORB> describer() {
@@ -59,7 +59,7 @@ std::vector<LandmarkDescriptions::Corner> LandmarkDescriptions::corners_of(const
   return corners;
 }
 
-/// Each landmark with the corner that is most like it, where that is like no other landmark more.
+/// Matches each landmark with its most similar corner, if no other landmark is more similar to that corner.
 std::vector<LandmarkSeen> LandmarkDescriptions::matched(const Image& image, std::span<const Corner> corners) {
   struct Nearest {
     int differing = max_differing + 1;

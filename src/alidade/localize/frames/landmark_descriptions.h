@@ -12,24 +12,24 @@ class Mat;
 
 namespace alidade {
 
-/// A landmark in an image.
+/// An observation of a landmark.
 struct LandmarkSeen {
   long id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
 };
 
-/// What images of a path looked like around their landmarks, to find these again from anywhere: binary descriptors of
-/// E. Rublee, V. Rabaud, K. Konolige & G. Bradski, "ORB: an efficient alternative to SIFT or SURF", ICCV 2011, not
-/// rotated: who comes back holds the camera much alike.
+/// Descriptions of images along a path around their landmarks, for recognition from any place: binary descriptors of E.
+/// Rublee, V. Rabaud, K. Konolige & G. Bradski, "ORB: an efficient alternative to SIFT or SURF", ICCV 2011, without
+/// rotation: on return, the camera is usually held in a similar way.
 class LandmarkDescriptions {
  public:
-  static constexpr std::size_t max_images = 400;  ///< Of more every second one leaves.
+  static constexpr std::size_t max_images = 400;  ///< Beyond that, every second one is removed.
 
-  /// Of an 8-bit grey image, the `frame`-th. Landmarks too near its edge are not described.
+  /// Adds an 8-bit grey image, the `frame`-th. Landmarks too near its edge are not described.
   void add(const cv::Mat& grey, std::size_t frame, std::span<const LandmarkSeen> landmarks);
 
-  /// Landmarks of earlier images that this one seems to show, image by image, those that match most first, at most
-  /// `most` lists, each of at least `least`. Some are wrong. Images of `before` and later are not compared.
+  /// Landmarks of earlier images that this one may show, one list per image, most matches first; at most `most` lists,
+  /// each of at least `least`. Some are wrong. Images from `before` on are not compared.
   [[nodiscard]] std::vector<std::vector<LandmarkSeen>> matches(const cv::Mat& grey, std::size_t before,
                                                                std::size_t least, std::size_t most) const;
 
@@ -41,7 +41,7 @@ class LandmarkDescriptions {
   };
   struct Image {
     std::size_t frame = 0;
-    std::vector<Described> landmarks;  ///< Each in two sizes.
+    std::vector<Described> landmarks;  ///< Each at two scales.
   };
   struct Corner {
     Eigen::Vector2d px = Eigen::Vector2d::Zero();

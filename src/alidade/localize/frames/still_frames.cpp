@@ -15,7 +15,7 @@ struct Look {
 };
 
 struct StillPoint {
-  std::vector<Look> looks;  ///< But for mismatches.
+  std::vector<Look> looks;  ///< Without mismatches.
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();
 };
 
@@ -44,7 +44,7 @@ void leave_out_mismatches(StillPoint& point) {
   point.mean_px /= sum;
 }
 
-/// What a camera that stands still sees.
+/// Observations by a camera that may stand still.
 class StillPoints {
  public:
   StillPoints(std::span<const ObservationFrame> frames, double sigma_px) {
@@ -59,15 +59,15 @@ class StillPoints {
     }
   }
 
-  /// Whether all scatter as noise does, to three σ of that.
+  /// Whether the scatter of all is that of noise, within 3σ.
   [[nodiscard]] bool is_still() const {
     constexpr double nearly_all = 0.95, sigmas = 3.0;
     return static_cast<double>(num_kept_) >= nearly_all * static_cast<double>(num_) && num_kept_ > 2 * points_.size() &&
            excess() < sigmas * sigma_excess();
   }
 
-  /// The known points' over stretches of so many frames. Their σ: by how much the means scatter, where that is more
-  /// than independent errors would; and what moves in between unseen.
+  /// Means of the known points over intervals of `num` frames. Their σ: from the scatter of the means, if larger than
+  /// for independent errors; plus motion hidden by noise.
   [[nodiscard]] std::vector<ObservationFrame> means(std::span<const ObservationFrame> frames,
                                                     std::span<const KnownPoint> known, std::size_t num) const {
     std::vector<ObservationFrame> out;
@@ -93,7 +93,7 @@ class StillPoints {
   }
 
  private:
-  /// u, v and one, weighted, by the number of a stretch.
+  /// Weighted sums of u, v and 1, by interval.
   [[nodiscard]] static std::map<std::size_t, Eigen::Vector3d> sums_of(const StillPoint& point, std::size_t num) {
     std::map<std::size_t, Eigen::Vector3d> sums;
     for (const Look& look : point.looks)
@@ -104,7 +104,7 @@ class StillPoints {
   [[nodiscard]] double dof() const { return 2.0 * static_cast<double>(num_kept_ - points_.size()); }
   [[nodiscard]] double excess() const { return squares_ / dof() - 1.0; }
   [[nodiscard]] double sigma_excess() const { return std::sqrt(2.0 / dof()); }
-  /// Of an observation, on average.
+  /// Mean variance of an observation.
   [[nodiscard]] double variance_px2() const {
     double sum = 0.0;
     for (const auto& [id, point] : points_)

@@ -8,12 +8,12 @@
 
 namespace alidade {
 
-/// What a camera that stands still sees of known points, averaged over thirty stretches of time. By poses of its own
-/// for each frame such a camera seems to move, as far as pixels' noise does, and what seems a parallax then grows with
-/// the number of frames until it outweighs all that is given (J. Neyman & E. Scott, "Consistent Estimates Based on
-/// Partially Consistent Observations", 1948). Each mean has the σ by which it scatters, and what a motion that the
-/// noise hides may add; of other points nothing says from one place how deep they are. None where there are too few
-/// frames, or the observations of all points scatter more than noise does.
+/// Observations of known points by a camera that stands still, averaged over thirty intervals. With a pose per frame
+/// such a camera appears to move, by pixel noise, and the apparent parallax grows with the number of frames until it
+/// outweighs the given data (J. Neyman & E. Scott, "Consistent Estimates Based on Partially Consistent Observations",
+/// 1948). σ of each mean is from their scatter, plus motion that noise may hide; depths of other points are
+/// undetermined from one place. Empty if there are too few frames, or the observations of all points scatter more than
+/// noise.
 [[nodiscard]] std::optional<KeptFrames> averaged_still(const KeptFrames& frames, std::span<const KnownPoint> known,
                                                        double sigma_px);
 

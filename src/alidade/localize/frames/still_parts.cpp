@@ -8,21 +8,21 @@
 namespace alidade {
 namespace {
 
-constexpr int every = 3;             // images: between two of a film hardly anything moves
-constexpr double shrunk = 0.5;       // noise counts half, and a clock's digits are wide enough
-constexpr float min_edge = 8.0f;     // grey values a pixel: an edge,
-constexpr float clear_edge = 16.0f;  // and one beside which what does not change stands still
-constexpr int enough_looks = 8;      // of an edge while the scene moved
+constexpr int every = 3;             // images: between two of a video hardly anything moves
+constexpr double shrunk = 0.5;       // halves the noise; a clock's digits are wide enough
+constexpr float min_edge = 8.0f;     // grey values per pixel: an edge,
+constexpr float clear_edge = 16.0f;  // and one near which unchanged pixels count as still
+constexpr int enough_looks = 8;      // comparisons of an edge while the scene moved
 constexpr double still_looks = 0.9, moved_edges = 0.6;
-constexpr double moved_share = 0.5, unmoved_share = 0.15;  // of what a move by a pixel of the shrunk image changes
+constexpr double moved_share = 0.5, unmoved_share = 0.15;  // of the change by a shift of one downsampled pixel
 
 }  // namespace
 
 struct StillParts::Counts {
   int num_images = 0;
   cv::Size size;
-  cv::Mat before;        ///< The image that is compared with, as floats.
-  cv::Mat looks, still;  ///< How often an edge was looked at, and was where it had been.
+  cv::Mat before;        ///< Reference image of the comparison, as floats.
+  cv::Mat looks, still;  ///< Number of comparisons of an edge, and of those without change.
   cv::Mat parts;         ///< 255: still.
 };
 
@@ -45,16 +45,16 @@ bool StillParts::add(const cv::Mat& smoothed) {
     counts.parts = cv::Mat::zeros(now.size(), CV_8U);
     return false;
   }
-  cv::Mat along_u, along_v, edge;  // of the image before: what moves by a pixel changes by so much
+  cv::Mat along_u, along_v, edge;  // gradient of the image before: the change by a shift of one pixel
   cv::Sobel(counts.before, along_u, CV_32F, 1, 0, 3, 0.125);
   cv::Sobel(counts.before, along_v, CV_32F, 0, 1, 3, 0.125);
   cv::magnitude(along_u, along_v, edge);
   const cv::Mat change = cv::abs(now - counts.before), is_edge = edge > min_edge;
   const cv::Mat has_moved = is_edge & (change > moved_share * edge);
   const int num_edges = cv::countNonZero(is_edge);
-  if (num_edges == 0 || cv::countNonZero(has_moved) < moved_edges * num_edges) return false;  // the scene stands
+  if (num_edges == 0 || cv::countNonZero(has_moved) < moved_edges * num_edges) return false;  // the scene does not move
   counts.before = now;
-  // A stroke stands still within, where its own edges are near; they change with what passes behind it.
+  // The inside of a stroke, near its own edges, stands still; the edges change with what passes behind it.
   cv::Mat near;
   cv::dilate(edge, near, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
   const cv::Mat is_near = near > clear_edge, is_still = is_near & (change < unmoved_share * near);

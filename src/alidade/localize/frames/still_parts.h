@@ -10,9 +10,9 @@ class Mat;
 
 namespace alidade {
 
-/// What of the images never moves while the scene does: a burnt-in clock, the rim of a round image, the vehicle itself.
-/// An edge that is where it was, while most edges of the image are not, stands still; what does so nine times in ten
-/// does not show the scene.
+/// Detects parts of the images that never move while the scene does: a burnt-in clock, the rim of a round image, the
+/// vehicle itself. An edge stands still if it is unchanged while most edges of the image move; one that does so nine
+/// times in ten is not part of the scene.
 class StillParts {
  public:
   StillParts();
@@ -20,11 +20,11 @@ class StillParts {
   StillParts(StillParts&&) noexcept;
   StillParts& operator=(StillParts&&) noexcept;
 
-  /// The next image, smoothed. Whether the parts are others than before.
+  /// Adds the next image, smoothed. Returns whether the still parts changed.
   bool add(const cv::Mat& smoothed);
-  /// Black where nothing is to be looked for: still edges with `margin_px` around. Of the images' size.
+  /// Zero where nothing should be searched: still edges, dilated by `margin_px`. Size of the images.
   [[nodiscard]] cv::Mat shown(int margin_px) const;
-  /// Of the image, without margin.
+  /// Fraction of the image, without margin.
   [[nodiscard]] double still_share() const;
 
  private:

@@ -26,16 +26,16 @@ constexpr std::size_t min_points = 4, min_for_misfits = 8, max_points = 64;
 /// A point over the frames of a window.
 struct WindowPoint {
   long id = 0;
-  Eigen::Vector2d third = Eigen::Vector2d::Zero(), slope = Eigen::Vector2d::Zero();  ///< Of unit weights. [px]
-  FlowOfPose J = FlowOfPose::Zero();  ///< By translation, one metre away, and rotation.
+  Eigen::Vector2d third = Eigen::Vector2d::Zero(), slope = Eigen::Vector2d::Zero();  ///< With unit-norm weights. [px]
+  FlowOfPose J = FlowOfPose::Zero();  ///< W.r.t. translation, at one metre, and rotation.
   bool fits = true;
 };
 using WindowPoints = std::vector<WindowPoint>;
 
-/// What is left of third differences.
+/// Residuals of third differences.
 struct Remains {
   std::vector<double> sizes_px, motions_px;
-  double num_free = 0.0;  ///< Components that neither poses nor points take.
+  double num_free = 0.0;  ///< Degrees of freedom left by poses and points.
 };
 
 PixelsById pixels_of(const ObservationFrame& frame) {
@@ -45,7 +45,7 @@ PixelsById pixels_of(const ObservationFrame& frame) {
   return pixels;
 }
 
-/// How far each point goes from one frame to the next, beside what most do, over the median of that.
+/// Step of each point between two frames relative to the median step, over the typical size of that.
 std::map<long, double> leaps_between(const PixelsById& before, const PixelsById& after) {
   std::vector<std::pair<long, Eigen::Vector2d>> steps;
   std::vector<double> u, v, sizes;
@@ -65,7 +65,7 @@ std::map<long, double> leaps_between(const PixelsById& before, const PixelsById&
   return leaps;
 }
 
-/// The frames without pixels that leap away and back: mismatches.
+/// The frames without pixels that jump away and back: mismatches.
 std::vector<PixelsById> without_leaps(std::span<const ObservationFrame> frames) {
   constexpr double far_leap = 6.0;  // σ
   std::vector<PixelsById> pixels;
@@ -85,7 +85,7 @@ std::vector<PixelsById> without_leaps(std::span<const ObservationFrame> frames) 
   return pixels;
 }
 
-/// How a pixel follows the camera's pose.
+/// Derivative of a pixel with respect to the camera's pose.
 std::optional<FlowOfPose> flow_at(const Camera& camera, const Eigen::Vector2d& px) {
   const auto ray = observation_ray(camera, px);
   const auto point = ray ? point_at_range(*ray, 1.0) : std::nullopt;
@@ -97,7 +97,7 @@ std::optional<FlowOfPose> flow_at(const Camera& camera, const Eigen::Vector2d& p
   return J;
 }
 
-/// The points that are in all four frames, at most so many.
+/// The points present in all four frames, at most `max_points`.
 WindowPoints window_points(std::span<const PixelsById> pixels, const std::array<double, num_of_window>& t_s,
                            const Camera& camera) {
   const std::array<double, num_of_window> weights = third_difference(t_s);
@@ -126,7 +126,7 @@ WindowPoints window_points(std::span<const PixelsById> pixels, const std::array<
   return points;
 }
 
-/// The change of pose that explains a difference of the points, by least squares with weights. None: not determined.
+/// The change of pose that explains a difference of the points, by weighted least squares. Empty: undetermined.
 template <typename WeightOf>
 std::optional<PoseChange> pose_change(const WindowPoints& points, Eigen::Vector2d WindowPoint::*difference,
                                       const WeightOf& weight_of) {
@@ -149,7 +149,7 @@ std::vector<double> misfits_of(const WindowPoints& points, const PoseChange& cha
   return misfits_px;
 }
 
-/// With `fits`, or of many points first by least absolute errors, then without those that are far off.
+/// Least squares, which sets `fits`; with many points first least absolute errors, then without outliers.
 std::optional<PoseChange> third_of_pose(WindowPoints& points) {
   constexpr int num_weighted = 6, num_again = 2;
   constexpr double far_off = 5.0;  // σ
@@ -175,12 +175,12 @@ std::optional<PoseChange> third_of_pose(WindowPoints& points) {
   return change;
 }
 
-/// Some fifty frames: the points' inverse depths are the same in all of them.
+/// Some fifty frames, with common inverse depths of the points.
 class Block {
  public:
   explicit Block(std::vector<WindowPoints> windows) : windows_(std::move(windows)) {}
 
-  /// Alternately poses' differences and inverse depths.
+  /// Alternates between the poses' differences and the inverse depths.
   [[nodiscard]] Remains remains() {
     constexpr int num_rounds = 4;
     Remains remains;
@@ -200,7 +200,7 @@ class Block {
     double sum = 0.0, squares = 0.0, squares_of_third = 0.0;
   };
 
-  /// What each window's pose leaves of its points, over what its least squares let through of their noise.
+  /// Residuals of each window's points after its pose change, scaled to their full noise.
   Remains by_poses() {
     constexpr double least_share = 0.02;
     Remains remains;
@@ -232,9 +232,9 @@ class Block {
     return remains;
   }
 
-  /// What a point's differences say of its inverse depth.
+  /// Accumulates the information on a point's inverse depth from its differences.
   void note(const WindowPoint& point, const PoseChange& third, const PoseChange& slope) {
-    constexpr double weight_of_slope = 0.1;  // far motions are not linear
+    constexpr double weight_of_slope = 0.1;  // large motions are not linear
     OfPoint& of_point = of_points_[point.id];
     const auto add = [&](const Eigen::Vector2d& seen, const PoseChange& change, double weight) {
       const Eigen::Vector2d by_translation = point.J.leftCols<3>() * change.head<3>();
@@ -247,7 +247,7 @@ class Block {
     add(point.slope, slope, weight_of_slope);
   }
 
-  /// With a prior at that of most, half of it wide.
+  /// Solves for the inverse depths, with a prior at the typical one, σ half of it.
   void adjust_depths(double sigma_px) {
     constexpr double precision = 4.0, least = 0.2, most = 5.0;
     const double of_prior = precision * sigma_px * sigma_px + 1e-12;
@@ -271,10 +271,10 @@ class Block {
   std::vector<WindowPoints> windows_;
   std::map<long, OfPoint> of_points_;
   std::map<long, double> inverse_depths_;
-  double num_of_depths_ = 0.0;  ///< Components of third differences that the inverse depths take.
+  double num_of_depths_ = 0.0;  ///< Degrees of freedom of third differences that the inverse depths use.
 };
 
-/// The windows of a block of frames that follow one another in usual time.
+/// The windows of a block of consecutive frames at the usual rate.
 std::vector<WindowPoints> windows_of(std::span<const ObservationFrame> frames, const Camera& camera, double usual_s) {
   constexpr double longest = 1.6, shortest = 0.3;  // of the usual time between frames
   const std::vector<PixelsById> pixels = without_leaps(frames);
@@ -292,7 +292,7 @@ std::vector<WindowPoints> windows_of(std::span<const ObservationFrame> frames, c
   return windows;
 }
 
-/// Of all frames, or of a long recording of blocks spread over it.
+/// Over all frames, or for a long recording over blocks spread across it.
 Remains remains_of(std::span<const ObservationFrame> frames, const Camera& camera) {
   constexpr std::size_t frames_of_block = num_of_window * windows_of_block, most_blocks = 8;
   std::vector<double> gaps_s;
@@ -323,7 +323,7 @@ std::optional<WhitePixels> white_pixels(std::span<const ObservationFrame> frames
   const auto at_90 = sizes_px.begin() + static_cast<std::ptrdiff_t>(9 * sizes_px.size() / 10);
   std::ranges::nth_element(sizes_px, at_90);
   const double large_px = *at_90, sigma_px = normal_from_mad * median_of(std::move(sizes_px));
-  // σ by the median size of n independent ones scatters by 1.17/√n of it; poses and depths make these less so.
+  // σ from the median size of n independent ones has a relative σ of 1.17/√n; poses and depths correlate these.
   return WhitePixels{.sigma_px = sigma_px,
                      .relative = 1.3 / std::sqrt(remains.num_free),
                      .motion_px = median_of(std::move(remains.motions_px)),
@@ -331,7 +331,7 @@ std::optional<WhitePixels> white_pixels(std::span<const ObservationFrame> frames
 }
 
 std::optional<double> other_sigma_px(std::span<const ObservationFrame> frames, const Camera& camera, double usual_px) {
-  constexpr double min_px = 0.1, max_px = 6.0;  // what finders of points reach, and what they need
+  constexpr double min_px = 0.1, max_px = 6.0;  // accuracy that point detectors reach, and that they need
   constexpr double min_off = 3.0, min_change = 0.1, max_tails = 1.2, of_motion = 0.1;
   const auto white = white_pixels(frames, camera);
   if (!white || white->sigma_px > max_px || white->tails > max_tails) return std::nullopt;

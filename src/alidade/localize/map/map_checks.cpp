@@ -12,8 +12,8 @@ std::string distance_text(double distance_m) {
   return distance_m < long_m ? text_of(1000.0 * distance_m, 2) + " mm" : text_of(distance_m, 2) + " m";
 }
 
-/// Few do no harm without their old positions. Where a part that moved as one is nearly as large as the one that
-/// stayed, nothing says which of both did.
+/// Few moved points do no harm once their old positions are dropped. If a part that moved as one is nearly as large as
+/// the one that stayed, it is undecidable which of them moved.
 void add_moved(const MovedPoints& moved, Verdict& verdict) {
   if (moved.num == 0) return;
   constexpr double few = 0.1;
@@ -36,9 +36,9 @@ void add_moved(const MovedPoints& moved, Verdict& verdict) {
   if (part > few || is_either) verdict.to_add = "make the map again";
 }
 
-/// The path is between where both parts put it, by more than its σ.
+/// The path is then between the poses by the two parts, off by more than its σ.
 void add_moved_part(const MovedPart& part, Verdict& verdict) {
-  constexpr double chance = 28.0;  // χ² of three, of some hundred parts: 99.9 %
+  constexpr double chance = 28.0;  // χ² of three, over some hundred parts: 99.9 %
   const std::string all = std::to_string(part.num_given);
   if (part.chi2 > chance)
     verdict.checks.push_back({"target's points", State::care,

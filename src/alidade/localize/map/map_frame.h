@@ -6,17 +6,17 @@
 
 namespace alidade {
 
-/// How a place moves, so far away from the centre, with a motion of the world and its size: translation [m], rotation
-/// [rad], relative size.
+/// Derivative of a position, at that offset from the centre, with respect to a similarity of the world: translation
+/// [m], rotation [rad], relative scale.
 [[nodiscard]] Eigen::Matrix<double, 3, 7> similarity_moves(const Eigen::Vector3d& away);
 
-/// The same error, by what it is about another centre.
+/// The same error, expressed about another centre.
 [[nodiscard]] SavedFrame about_centre(const SavedFrame& frame, const Eigen::Vector3d& centre);
 
-/// The frame of a map whose unit becomes `scale`, known to `sigma_rel`, about the origin.
+/// The frame of a map whose unit is multiplied by `scale`, with relative σ `sigma_rel`, about the origin.
 [[nodiscard]] SavedFrame scaled_frame(SavedFrame frame, double scale, double sigma_rel);
 
-/// A path and its map in the frame of an earlier one: that frame's own error moves all of it alike.
+/// For a path and map in the frame of an earlier map: adds the error of that frame, common to all.
 void widen_by_frame(const SavedFrame& frame, Localization& result);
 
 }  // namespace alidade

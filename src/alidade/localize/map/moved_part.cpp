@@ -14,14 +14,14 @@ namespace {
 
 constexpr std::size_t enough_given = 12, most_given = 600;
 
-/// A point of the target: where it is given, how its place moves with a similarity, and what it is off, both over σ.
+/// A point of the target: its given position; derivative of it by a similarity, and its deviation, both over σ.
 struct GivenPlace {
   Eigen::Vector3d place, off;
   Eigen::Matrix<double, 3, 7> moves;
   double weight = 1.0;
 };
 
-/// Those of the target that are in the map, less the similarity that fits them best.
+/// Points of the target that are in the map, minus the best-fitting similarity.
 class GivenPlaces {
  public:
   GivenPlaces(std::span<const MapPoint> map, std::span<const KnownPoint> given) {
@@ -38,7 +38,7 @@ class GivenPlaces {
   [[nodiscard]] bool is_determined() const { return is_determined_; }
   [[nodiscard]] std::size_t num() const { return places_.size(); }
 
-  /// What a shift of some of them explains (χ² of three), and how far it is.
+  /// Decrease of χ² (three components) by a shift of some of them, and its length.
   [[nodiscard]] std::pair<double, double> shift_of(std::span<const std::size_t> part) const {
     double squares = 0.0;
     Eigen::Matrix<double, 7, 3> across = Eigen::Matrix<double, 7, 3>::Zero();
@@ -49,13 +49,13 @@ class GivenPlaces {
       score += places_[i].weight * places_[i].off;
     }
     const Ldlt information(squares * Eigen::Matrix3d::Identity() - across.transpose() * normal_.solve_each(across));
-    constexpr double least = 0.02;  // the rest of it any similarity takes
+    constexpr double least = 0.02;  // else a similarity absorbs it
     if (!(information.min_pivot() > least * squares)) return {0.0, 0.0};
     const Eigen::Vector3d shift = information.solve(score);
     return {score.dot(shift), shift.norm()};
   }
 
-  /// In order along a direction, or of distance from a point.
+  /// Sorted along a direction, or by distance from a point.
   template <typename Key>
   [[nodiscard]] std::vector<std::size_t> sorted_by(const Key& key) const {
     std::vector<std::size_t> order(places_.size());
@@ -94,7 +94,7 @@ class GivenPlaces {
   bool is_determined_ = false;
 };
 
-/// Each shift of the first so many of an order: the one that explains most is kept.
+/// Tries a shift of the first part of an order, for each share; keeps the one that explains most.
 void try_parts(const GivenPlaces& places, std::span<const std::size_t> order, std::span<const double> shares,
                MovedPart& best) {
   constexpr std::size_t least_points = 4;
@@ -109,9 +109,9 @@ void try_parts(const GivenPlaces& places, std::span<const std::size_t> order, st
   }
 }
 
-/// Largest eigenvalue of three numbers' covariance, of n points of noise, at 99.9 %.
+/// Limit of the largest eigenvalue of a 3 × 3 covariance of n noise points, at 99.9 %.
 double noise_limit(std::size_t n) {
-  constexpr double at_999 = 3.27;  // of C. A. Tracy & H. Widom's distribution
+  constexpr double at_999 = 3.27;  // of the Tracy–Widom distribution (C. A. Tracy & H. Widom)
   const double a = std::sqrt(static_cast<double>(n) - 1.0), b = std::sqrt(3.0);
   return (a + b) * ((a + b) + at_999 * std::cbrt(1.0 / a + 1.0 / b)) / static_cast<double>(n);
 }

@@ -9,15 +9,15 @@
 #include "alidade/localize/frames/known_map.h"
 #include "alidade/localize/path/path_resection.h"
 
-// A filter that begins in a map whose half has moved takes a pose between both halves, or the one that it saw first: it
-// gates by what it expects. Poses of single frames owe nothing to each other.
+// If half of a map has moved, a filter that starts in it takes a pose between both halves, or that of the one seen
+// first: it gates by its predictions. Poses of single frames are independent of each other.
 
 namespace alidade {
 namespace {
 
 constexpr std::size_t least_seen = 8, least_of_frame = 12, enough_frames = 3;
 
-/// What of a map one frame shows, and sets of points of which each fits a pose: that of most, and of the rest.
+/// The map's points in one frame, and sets of them that fit one pose: the largest set, and that of the rest.
 struct Sighting {
   std::vector<long> ids;
   std::vector<std::vector<bool>> fits;
@@ -25,10 +25,10 @@ struct Sighting {
 
 using SavedById = std::unordered_map<long, const SavedPoint*>;
 
-/// The pose that most fit. None: fewer than a few do.
+/// The pose that most points fit. Empty: too few do.
 std::optional<CameraResection> pose_of_most(const Camera& camera, std::span<const PlacedObservation> some,
                                             std::span<const PlacedObservation> all) {
-  constexpr int num_draws = 150;  // of halves an eighth of them are of one
+  constexpr int num_draws = 150;  // with two halves, one in eight triples is all from a given one
   constexpr std::size_t max_poses = 12;
   constexpr double gate = 13.8, near_px = 6.0;
   if (some.size() < least_seen) return std::nullopt;
@@ -66,7 +66,7 @@ Sighting sighting_of(const Camera& camera, const ObservationFrame& frame, const 
   return sighting;
 }
 
-/// The frames to look at, spread over those that show enough of the map.
+/// The frames to evaluate, spread over those with enough points of the map.
 std::vector<const ObservationFrame*> frames_to_judge(std::span<const ObservationFrame> frames, const SavedById& map) {
   constexpr std::size_t most = 24;
   std::vector<const ObservationFrame*> enough;
@@ -80,7 +80,7 @@ std::vector<const ObservationFrame*> frames_to_judge(std::span<const Observation
   return chosen;
 }
 
-/// In how many frames a point was seen, and in how many it fitted.
+/// Per point: in how many frames it fitted, and in how many it was seen.
 struct Votes {
   std::map<long, std::pair<std::size_t, std::size_t>> of_point;
 
@@ -91,7 +91,7 @@ struct Votes {
       ++num_seen;
     }
   }
-  /// How well a set agrees with what was found so far.
+  /// Agreement of a set with the votes so far.
   [[nodiscard]] double agreement(const Sighting& sighting, const std::vector<bool>& fits) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < sighting.ids.size(); ++i) {
@@ -104,7 +104,7 @@ struct Votes {
   }
 };
 
-/// The sets that agree with the largest of all, frame by frame from there on, and back.
+/// Votes of the sets that agree with the largest one, frame by frame from there on, then backwards.
 Votes votes_of(std::span<const Sighting> sightings) {
   const auto largest = std::ranges::max_element(
       sightings, {}, [](const Sighting& each) { return std::ranges::count(each.fits.front(), true); });
@@ -129,7 +129,7 @@ std::vector<Sighting> sightings_of(const Camera& camera, std::span<const Observa
   return sightings;
 }
 
-/// So many of some points as one pose fits in the middle one of the frames.
+/// Number of points that one pose fits, median over the frames.
 std::size_t num_as_one(std::span<const Sighting> sightings) {
   if (sightings.empty()) return 0;
   std::vector<std::size_t> nums;
@@ -140,7 +140,7 @@ std::size_t num_as_one(std::span<const Sighting> sightings) {
   return *middle;
 }
 
-/// Those that fit in fewer than a third of their frames. `num_judged`: of how many.
+/// Points that fit in less than a third of their frames. `num_judged`: how many were judged.
 std::set<long> misfits_of(std::span<const Sighting> sightings, std::size_t& num_judged) {
   std::set<long> ids;
   num_judged = 0;
@@ -158,7 +158,7 @@ std::set<long> misfits_of(std::span<const Sighting> sightings, std::size_t& num_
 
 MovedMapPoints moved_map_points(const Camera& camera, std::span<const ObservationFrame> frames, const SavedMap& map,
                                 double sigma_px) {
-  constexpr int most_rounds = 5;  // a pose between two parts that are little apart fits many of both
+  constexpr int most_rounds = 5;  // a pose between two parts that are close together fits many of both
   SavedById still, gone;
   for (const KnownPoint& known : known_points(map))
     still[known.id] = &*std::ranges::find(map.points, known.id, &SavedPoint::id);

@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t max_age = 60;  // frames; by then the path itself has drifted
+constexpr std::size_t max_age = 60;  // frames; after that the path itself has drifted
 
-/// Whether `there` is where `before` has led along the path, from `from` to `to`.
+/// Whether `there` equals `before`, propagated along the path from `from` to `to`.
 bool is_same(const StartHypothesis& there, const StartHypothesis& before, const Rigid3& from, const Rigid3& to) {
   constexpr double max_chi2 = 22.5, path_error = 0.1;
   const Rigid3 expected = before.motion.world_from_cam * from.inverse() * to;

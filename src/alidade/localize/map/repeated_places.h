@@ -8,12 +8,12 @@
 
 namespace alidade {
 
-/// Poses from a few known points that contradict the path. Where some of them show another point, a pose fits them by
-/// chance; the next such pose is then another one. Where the path is wrong, they say the same correction of it.
+/// Poses from a few known points that contradict the path. If some observations are mismatched, a pose fits by chance,
+/// and the next such pose is a different one. If the path is wrong, they all give the same correction of it.
 class RepeatedPlaces {
  public:
-  /// Keeps them, with the path's pose in this frame. How many of the last frames before it said the same (χ² of six
-  /// components, 99.9 %, where the path between them is good to a tenth of its length).
+  /// Adds poses, with the path's pose in this frame. Returns how many of the recent frames gave the same correction (χ²
+  /// of six components, 99.9 %, assuming that the path between them is accurate to a tenth of its length).
   std::size_t add(std::span<const StartHypothesis> places, const Rigid3& path, std::size_t frame);
   void clear() { said_.clear(); }
 

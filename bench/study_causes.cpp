@@ -67,7 +67,7 @@ std::string size_text(const Case<Setup>& one, double size) {
 /// One table; returns how many good verdicts stood over an error above 5σ.
 template <typename Setup>
 int table_of(const std::vector<Case<Setup>>& cases, int draws, const std::string& only) {
-  fmt::print("| what is wrong | by | seen | ● | worst error below ● | silent |\n|---|---|---|---|---|---|\n");
+  fmt::print("| fault | size | detected | ● | worst error at ● | undetected, beyond 5σ |\n|---|---|---|---|---|---|\n");
   int silent = 0;
   std::string power;
   for (const Case<Setup>& one : cases) {
@@ -85,7 +85,7 @@ int table_of(const std::vector<Case<Setup>>& cases, int draws, const std::string
     if (size_text(one, seen_from) != "–" && seen_from >= 0.0)
       power += fmt::format("{}{} {}", power.empty() ? "" : ", ", one.name, size_text(one, seen_from));
   }
-  if (!power.empty()) fmt::print("\nSeen at 99 % of the draws or more from: {}.\n", power);
+  if (!power.empty()) fmt::print("\nDetected in 99 % of the draws or more from: {}.\n", power);
   return silent;
 }
 
@@ -209,12 +209,12 @@ int main(int argc, char** argv) {
       {"centimetres", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.unit_m = 0.01; }},
   };
   fmt::print(
-      "# What is wrong with a rig or a rangefinder, and what is seen of it\n\n`study_causes {}` (`make study` draws "
+      "# Faults of rigs and rangefinders, and which are detected\n\n`study_causes {}` (`make study` draws "
       "100): "
-      "one thing wrong at a time, {} draws a row. Seen: refused, of care, or estimated. The last columns: the largest "
-      "error below a good verdict, in its stated σ, and how many draws were good and off by more than 5σ.\n\n"
-      "## `alidade rig`\n\nTwo heads, 320×240, f 338 px, corners 0.2 px, readings 0.02°, five places of a board, four "
-      "views per head and position; lenses, square and (but where it is said) the encoders' scales given as exact.\n\n",
+      "one fault at a time, {} draws per row. Detected: refused, ◆, or estimated. The last columns: the largest "
+      "error of a draw that is ●, in its stated σ, and how many draws were ● and off by more than 5σ.\n\n"
+      "## `alidade rig`\n\nTwo heads, 320×240, f 338 px, corners 0.2 px, readings 0.02°, five placements of a board, "
+      "four views per head and placement; lenses, square and (unless stated) the encoders' scales given as exact.\n\n",
       draws, draws);
   int silent = table_of(cases, draws, only);
   fmt::print(

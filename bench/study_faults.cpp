@@ -128,15 +128,16 @@ std::vector<Ladder> ladders() {
 
 int main(int argc, char** argv) {
   const int draws = argc > 1 ? std::atoi(argv[1]) : 100;
-  fmt::print("# How large a fault must be to be seen\n\n");
+  fmt::print("# How large a fault must be to be detected\n\n");
   fmt::print(
       "`study_faults {}` (`make study`): simulated logs, each with one fault; the share of {} draws in which the data "
-      "show it (named, estimated, or the answer not called good). Seen in 99 %: the smallest size of those tried at "
-      "which and beyond which at least 99 % are. Sizes of `track` are those of `simulate track --fault`, of `identify` "
+      "show it (named, estimated, or the answer not called good). Detected in 99 %: the smallest tested size "
+      "from which on at least 99 % are. Sizes of `track` are those of `simulate track --fault`, of `identify` "
       "those of `simulate servo` (steps of several sizes, 200 units, 5 s at 100 Hz, 0.05°).\n\n",
       draws, draws);
   fmt::print(
-      "| fault | unit | size: share seen % | seen in 99 % | good, and off by more than 5σ |\n|---|---|---|---|---|\n");
+      "| fault | unit | size: share detected % | detected in 99 % | good, and off by more than 5σ "
+      "|\n|---|---|---|---|---|\n");
   int all_wrong = 0;
   for (const Ladder& ladder : ladders()) {
     std::string shares, least = "not in these";
@@ -159,12 +160,9 @@ int main(int argc, char** argv) {
     std::fflush(stdout);
   }
   fmt::print(
-      "\nWhat turns both rays in their common plane (in G yaw and pan zero: heads side by side, a target about level "
-      "with "
-      "them) and the length of the baseline move the range alone: no observation shows it, and a rig file that does "
-      "not say "
-      "its "
-      "σ is therefore never good. Called good and off by more than 5σ: {}.\n",
+      "\nErrors that rotate both rays in their common plane (in G yaw and pan zero: heads side by side, a target about "
+      "level with them) and the length of the baseline move only the range: no observation shows it, so with a rig "
+      "file that does not state their σ the verdict is never ●. Called good and off by more than 5σ: {}.\n",
       all_wrong);
   return all_wrong == 0 ? 0 : 1;
 }

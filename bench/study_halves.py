@@ -108,7 +108,7 @@ def main():
           "is split\nat random into two halves; both are calibrated by `alidade calibrate` with its defaults, and "
           "z is the difference of a lens\nparameter in its σ, over all parameters and splits. A σ that a second, "
           "independent measurement confirms has RMS z near 1.\nGoals: 0.6 to 1.4, at most 3 % beyond 3σ. The model's σ "
-          "is that of corners that err by themselves, which other tools state.\nPixels: where the two cameras see a point "
+          "is that for independent corner errors, which other tools state.\nPixels: where the two cameras see a point "
           "within 3σ of each other, by `alidade camera diff`; goal: 95 %.\n")
     print_head("photos")
     with tempfile.TemporaryDirectory() as made:
@@ -121,7 +121,7 @@ def main():
             met = met and is_met
             print(f"| {name} | {len(photos)} {cells}", flush=True)
         few = max(1, splits // 4)
-        print(f"\n## Parts of few photos\n\nTwo disjoint parts of as many photos, where the set has them; {few} pairs each.\n")
+        print(f"\n## Parts of few photos\n\nTwo disjoint parts with the same number of photos, if the set has enough; {few} pairs each.\n")
         print_head("photos of a part")
         for name, photos, options in sets():
             for size in (size for size in PARTS if 2 * size <= len(photos)):

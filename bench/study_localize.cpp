@@ -93,7 +93,7 @@ bool print_goals(bool met) {
 std::string word_of(DistortionVariant variant) { return words_code(variant, distortion_words()).write(); }
 
 bool study_protocol(int num) {
-  fmt::print("\n## The protocol, three lenses\n\nDepths 3 %, points as places; {} sequences.\n", num);
+  fmt::print("\n## The protocol, three lenses\n\nDepths 3 %, points as positions; {} sequences.\n", num);
   print_head("lens, filter");
   std::array<std::vector<ProtocolRun>, 3> runs;
   for (const DistortionVariant variant :
@@ -106,7 +106,7 @@ bool study_protocol(int num) {
   }
   const auto& [none, radial1, full] = runs;
   const double p1 = mean(of(full, &ProtocolRun::p1_mean));
-  fmt::print("\nOf the recommended filter:\n");
+  fmt::print("\nGoals of the recommended filter:\n");
   bool met = check("full p1 mean [%]", p1, 0.0, 0.45);
   met = check("full p5 mean [%]", mean(of(full, &ProtocolRun::p5_mean)), 0.0, 0.27) && met;
   met = check("full p1 last, worst [%]", quantile(of(full, &ProtocolRun::p1_last), 1.0), 0.0, 1.0) && met;
@@ -125,7 +125,7 @@ bool study_depths(int num) {
   for (const double depth : {0.1, 0.3}) {
     const auto name = [&](const char* filter) { return fmt::format("{:.0f} %, {}", 100.0 * depth, filter); };
     const auto full = DistortionVariant::full;
-    print_row(name("places, all at once"), run_all(num, depth, full, paper_filter(), 1, FeatureKind::xyz));
+    print_row(name("positions, all at once"), run_all(num, depth, full, paper_filter(), 1, FeatureKind::xyz));
     print_row(name("inverse depths, in order, one start"),
               run_all(num, depth, full, recommended_filter(), 1, FeatureKind::inverse_depth));
     const auto runs = run_all(num, depth, full, recommended_filter(), 5, FeatureKind::inverse_depth);
@@ -225,7 +225,7 @@ bool study_disturbances(int num) {
 
 int main(int argc, char** argv) {
   const int num = argc > 1 ? std::atoi(argv[1]) : 200, few = argc > 2 ? std::atoi(argv[2]) : 20;
-  fmt::print("# Localisation under water: what the lens is worth, and what the filter survives\n\n");
+  fmt::print("# Localisation under water: effect of the lens model, and robustness of the filter\n\n");
   fmt::print(
       "`study_localize {} {}` (`make study`): `simulate underwater`'s scene, 8 points of a board (4 known to 1 mm), 35 "
       "frames at 10 Hz, pixels 0.5 px. p1 is the board's corner, p5 its centre; errors are of the distance from the "

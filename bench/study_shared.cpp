@@ -61,8 +61,9 @@ Covered of_cause(const Cause& cause, int runs) {
 int main(int argc, char** argv) {
   const int runs = argc > 1 ? std::max(10, std::atoi(argv[1])) : 800;
   fmt::print(
-      "# What makes a photo's corners share errors, one by one\n\n"
-      "`study_shared {}` (`make study`): {} photos of a 9×6 board, 640×480, noise of {} px a coordinate, poses drawn\n"
+      "# Causes of errors that a photo's corners share\n\n"
+      "`study_shared {}` (`make study`): {} photos of a 9×6 board, 640×480, noise of {} px per coordinate, poses "
+      "drawn\n"
       "for each calibration; fx, fy, cx and cy together. Goal: 90 to 98 % inside 2σ.\n\n"
       "| cause | size | σ / scatter | inside 1σ, % | 2σ, % | 3σ, % |\n|---|---|---|---|---|---|\n",
       runs, photos, noise_px);

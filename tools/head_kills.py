@@ -212,8 +212,8 @@ def main():
             counts[what] += 1
             bad[what] += bool(faults)
             for fault in faults: print(f"{what}, {how}: {fault}", flush=True)
-    print(f"# Runs with a head, broken at random instants\n\n`tools/head_kills.py build/release/alidade --runs {options.runs} --seed {options.seed}`: what must hold stands at its head.\n")
-    print("| broken | runs | that did not hold |\n|---|---|---|")
+    print(f"# Runs with a head, interrupted at random instants\n\n`tools/head_kills.py build/release/alidade --runs {options.runs} --seed {options.seed}`: the comment at the top of the tool lists what must hold.\n")
+    print("| interruption | runs | failed |\n|---|---|---|")
     for what in BREAKS: print(f"| {what} | {counts[what]} | {bad[what]} |")
     return 1 if sum(bad.values()) else 0
 

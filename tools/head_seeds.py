@@ -94,18 +94,18 @@ def page(rows, failed, options):
               all(row["focal"] < FOCAL for row in rows)),
              ("delay off by at most", f"{1e3 * DELAY_S:g} ms", f"{1e3 * max(row['delay'] for row in rows):.2f} ms", all(row["delay"] < DELAY_S for row in rows)),
              ("head time", f"{HEAD_S:g} s", f"{min(row['time'] for row in rows):.0f} to {max(row['time'] for row in rows):.0f} s", all(row["time"] <= HEAD_S for row in rows)),
-             ("off line the same to the last digit", "all", f"{sum(row['same'] for row in rows)} of {len(rows)}", all(row["same"] for row in rows)),
+             ("offline the same to the last digit", "all", f"{sum(row['same'] for row in rows)} of {len(rows)}", all(row["same"] for row in rows)),
              ("without an answer", "0", f"{failed}", failed == 0)]
-    print(f"""# A camera that calibrates itself, on a head by others
+    print(f"""# A camera that calibrates itself, on a third-party head
 
 `tools/head_seeds.py build/release/alidade WORLD --seeds {options.seeds} --first {options.first} --together {options.together}`: Hamlib's `rotctld -m 1`, and a rendered
-world that reads the angle from it (`WORLD`: a program that serves it, the tool's head says how it is called); each seed has a lens
-(f 500 to 900 px), a mounting (4° an axis) and a delay (up to 80 ms) of its own.
+world that reads the angle from it (`WORLD`: a program that serves it; the comment at the top of the tool says how it is called); each seed has a lens
+(f 500 to 900 px), a mounting (4° per axis) and a delay (up to 80 ms) of its own.
 
-| {len(rows) + failed} seeds | asked | seen |
+| {len(rows) + failed} seeds | required | measured |
 |---|---|---|""")
     for what, asked, seen, holds in lines: print(f"| {what} | {asked} | {seen}{'' if holds else ' ✗'} |")
-    print(f"\nVerdict ●: {sum(row['state'] == 'good' for row in rows)} of {len(rows)}. What the others said, and how often:\n")
+    print(f"\nVerdict ●: {sum(row['state'] == 'good' for row in rows)} of {len(rows)}. The reasons of the others, and how often they were given:\n")
     said = collections.Counter(care for row in rows for care in row["cares"])
     for care, times in said.most_common(): print(f"- {times}: {care}")
     print("\n| seed | f off [%] | delay off [ms] | head time [s] | largest error [σ] |\n|---|---|---|---|---|")

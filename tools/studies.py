@@ -35,42 +35,42 @@ MAP = [f"map_{col}_{row}" for row in range(4) for col in range(5)]
 BEAM = [("origin x y z [mm]", ["origin_x_m", "origin_y_m", "origin_z_m"], 1e3), ("direction [mrad]", ["direction_a_rad", "direction_b_rad"], 1e3)]
 FEW = "calibrate --trials {} --scenes 0 --vary photos=5:17:4"
 PAGES = {
-    "studies": ("Calibration: does σ mean what it says?", """Simulated corners of a 9×6 board, photos of 640×480, normal noise of 0.1 px a coordinate, model `brown` with nine free parameters; the bound
-counts the unknown poses. `map`: the σ map at 5 × 4 pixels from corner to corner, each calibrated camera's error there after the implied rotation, along the
+    "studies": ("Calibration: does σ mean what it says?", """Simulated corners of a 9×6 board, photos of 640×480, normal noise of 0.1 px per coordinate, model `brown` with nine free parameters; the bound
+includes the unknown poses. `map`: the σ map at 5 × 4 pixels from corner to corner, with each calibrated camera's error there after removing the implied rotation, along the
 longest axis of its covariance.""", [
-        ("Corners that err by themselves", "Goals: 68 ± 4, 95 ± 2 % inside 1, 2σ; RMS error at most 1.10 of the Cramér–Rao bound.",
+        ("Independent corner errors", "Goals: 68 ± 4, 95 ± 2 % inside 1, 2σ; RMS error at most 1.10 of the Cramér–Rao bound.",
          [("", "calibrate --trials 2400 --sigma-map")], Goal((0, 1.10), **NORMAL), []),
-        ("Errors that the corners of a photo share", "A smooth field of each photo's own on top, 0.1 px a term at the board's border. Goal: 90 to 98 % inside 2σ.",
+        ("Errors that the corners of a photo share", "Each photo has an additional smooth error field of its own, 0.1 px per term at the board's border. Goal: 90 to 98 % inside 2σ.",
          [("", "calibrate --trials 2400 --shared 0.1")], Goal(**SHARED), []),
-        ("From five photos on", "Poses drawn again for each calibration. Goals: 95 ± 2 % inside 2σ where corners share nothing.",
+        ("From five photos on", "Poses are drawn again for each calibration. Goals: 95 ± 2 % inside 2σ if corner errors are independent.",
          [("flat", FEW.format(800)), ("free", FEW.format(200) + " --board-shape free")], Goal(two=(0.93, 0.97)), []),
         ("From five photos on, with errors that corners share", "Goal: 90 to 98 % inside 2σ.",
          [("flat", FEW.format(800) + " --shared 0.1"), ("free", FEW.format(200) + " --board-shape free --shared 0.1")], Goal(**SHARED), [])]),
-    "studies-observe": ("Observing a rotating camera: the bound, and what σ covers", "The whole job of `alidade observe`, 1 to 6 s at 30 Hz; other points for each trial.", [
-        ("", "Goals from 61 rows on (before, the errors are not yet normal): RMS error at most 1.10 of the bound, 68 ± 4, 95 ± 2 % inside 1, 2σ.",
+    "studies-observe": ("Observing a rotating camera: the bound, and what σ covers", "Each trial runs the whole job of `alidade observe` on 1 to 6 s at 30 Hz, with different points.", [
+        ("", "Goals from 61 rows on (with fewer, the errors are not yet normal): RMS error at most 1.10 of the bound, 68 ± 4, 95 ± 2 % inside 1, 2σ.",
          [("", "observe --method hybrid --trials 2000 --noise 0.3162 --vary rows=31:181:30 --scenes 2000")], Goal((0, 1.10), **NORMAL, begin=61), [])]),
     "studies-rangefinder": ("A laser rangefinder: error against the number of shots, the bound, and what σ covers",
                             """Board 9×6 of 40 mm, corners 0.2 px, spot 0.3 px, readings 2 mm, 0.5–4 m, tilts 0–45°, lens known to 1.5, 1.5, 2, 2 px.
-`all` refines lens, boards and beam together, `beam` holds lens and boards.""", [
+`all` refines lens, boards and beam together; `beam` keeps lens and boards fixed.""", [
         ("18 shots", "Goals: RMS error at most 1.10 of the bound, 68 ± 4, 95 ± 2 % inside 1, 2σ.",
          [(method, f"rangefinder --trials 2000 --method {method}") for method in ("joint", "spot", "plane")], Goal((0, 1.10), **NORMAL), BEAM),
         ("Against the number of shots", "",
          [(f"{method}, {refine}", f"rangefinder --trials 200 --method {method} --refine {refine} --vary shots={first}:30:6")
           for method, first in (("joint", 6), ("spot", 6), ("plane", 6)) for refine in ("all", "beam")], Goal(), BEAM),
-        ("Few shots", "A plane needs five.", [("joint", "rangefinder --trials 1000 --vary shots=3:6:1"), ("spot", "rangefinder --trials 1000 --method spot --vary shots=3:6:1")], Goal(), BEAM)]),
-    "studies-turned": ("Photos of a camera turned by hand", """f 850 to 2000 px, 5 to 14 photos of 1280 × 960; k1, centre, noise (0.2 to 1 px), rotations and points (at 2 to 20 m) drawn again for each trial; what is wrong is
-the row's. Errors of f are relative.""", [
-        ("Said to be on the spot", "`--on-the-spot`. Goals: 93 % inside 2σ, 97 % inside 3σ, none called good that is beyond 5σ.",
+        ("Few shots", "With planes alone, five shots are needed.", [("joint", "rangefinder --trials 1000 --vary shots=3:6:1"), ("spot", "rangefinder --trials 1000 --method spot --vary shots=3:6:1")], Goal(), BEAM)]),
+    "studies-turned": ("Photos of a camera turned by hand", """f 850 to 2000 px, 5 to 14 photos of 1280 × 960; k1, centre, noise (0.2 to 1 px), rotations and points (at 2 to 20 m) are drawn again for each trial; each row has one
+fault. Errors of f are relative.""", [
+        ("Rotation on the spot", "`--on-the-spot`. Goals: 93 % inside 2σ, 97 % inside 3σ, none called good that is beyond 5σ.",
          [(label, f"turned --trials 200 --on-the-spot {words}".strip()) for label, words in (
-             ("clean", ""), ("0.5 % wrong matches", "--wrong-matches 0.005"), ("30 % wrong matches", "--wrong-matches 0.3"), ("a quarter of the points moves", "--moving-points 0.25"))],
+             ("clean", ""), ("0.5 % wrong matches", "--wrong-matches 0.005"), ("30 % wrong matches", "--wrong-matches 0.3"), ("a quarter of the points moving", "--moving-points 0.25"))],
          Goal(two=(0.93, 1), three=(0.97, 1), good_beyond_5=0), [("f [%]", ["fx"], 100.0)]),
         ("By hand", "Goals: 97 % inside 3σ, none called good that is beyond 5σ.",
          [(label, f"turned --trials 200 {words}") for label, words in (
              ("lever of 5 mm", "--lever 0.005"), ("lever of 5 cm", "--lever 0.05"), ("lever of 20 cm", "--lever 0.2"), ("the hand steps by 1 cm", "--step 0.01"), ("focus walks by 0.3 %", "--focus 0.003"))],
          Goal(three=(0.97, 1), good_beyond_5=0), [("f [%]", ["fx"], 100.0)])]),
-    "studies-chain": ("σ at the end of a chain", """13 photos of a 9×6 board a camera (640×480, 0.1 px), then 5 places of the board seen by both heads (0.2 px, encoders 0.02°, their scales
-estimated), then a target for 3 s (0.3 px, 0.02°), heads 0.5 m apart: where it is at the end. `exact`: the track takes rig and lenses as exact.""", [
-        ("", "Goal: RMS error 0.84 to 1.14 of the stated σ, of each axis at every range; `exact` shows what the chain is worth.",
+    "studies-chain": ("σ at the end of a chain", """Each trial calibrates every camera from 13 photos of a 9×6 board (640×480, 0.1 px), then the rig from 5 placements of the board seen by both heads (0.2 px, encoders 0.02°, their scales
+estimated), and then tracks a target for 3 s (0.3 px, 0.02°, heads 0.5 m apart). The error is that of the last position. `exact`: the track takes rig and lenses as exact.""", [
+        ("", "Goal: RMS error 0.84 to 1.14 of the stated σ for each axis at every range; `exact` shows the effect of ignoring the chain.",
          [("", "chain --trials 200 --vary range=1:13:4")], Goal((0.84, 1.14)), [("error x y z [mm]", ["x_m", "y_m", "z_m"], 1e3)]),
         ("Exact", "", [("", "chain --trials 200 --exact --vary range=1:13:4")], Goal(), [("error x y z [mm]", ["x_m", "y_m", "z_m"], 1e3)])]),
 }

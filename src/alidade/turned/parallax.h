@@ -4,13 +4,13 @@
 
 namespace alidade {
 
-inline constexpr double parallax_is_seen = 6.0;  ///< Of ParallaxTest::z: what is above is no noise.
+inline constexpr double parallax_is_seen = 6.0;  ///< Threshold of ParallaxTest::z, above which it is not noise.
 
-/// Do the residuals of a pair of photos lie along the lines to one point, as those of a camera whose centre moved?
-/// Summed over the matches, the square along such a line less the square across it is zero in the mean for noise of any
-/// size that knows no direction, and the parallax' square else; the point is the one of 200 directions that shows most.
-/// Noise that has a direction, as along edges, is told from it by what agrees with nothing: neither neighbours' misfits
-/// with each other nor a point's in some photos with those in others; z is then no larger than that agreement's.
+/// Tests whether the residuals of a pair of photos lie along the lines to one point, as for a camera whose centre
+/// moved. Summed over the matches, the square along such a line minus the square across it has zero mean for isotropic
+/// noise of any size, and otherwise the square of the parallax; the point is the one of 200 directions with the largest
+/// sum. Directional noise, as along edges, is recognised by its lack of agreement, of neighbours' residuals with each
+/// other and of a point's residuals in some photos with those in others; z is limited to the z of that agreement.
 [[nodiscard]] ParallaxTest parallax_of(const TurnedFit& fit);
 
 }  // namespace alidade

@@ -7,16 +7,16 @@
 
 namespace alidade {
 
-/// Two photos whose matches agree on one homography, as those of a rotating camera do: H = K_b R K_a⁻¹.
+/// Two photos whose matches agree with one homography, as for a rotating camera: H = K_b R K_a⁻¹.
 struct PhotoLink {
   int photo_a = 0, photo_b = 0;
-  std::size_t pair = 0;                                    ///< In MatchedPhotos::pairs.
-  std::vector<int> inliers;                                ///< Of the pair's matches.
-  Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();  ///< The homography, normalised pixels.
-  bool is_same_image = false;                              ///< Every point is where it was.
+  std::size_t pair = 0;                                    ///< Index in MatchedPhotos::pairs.
+  std::vector<int> inliers;                                ///< Indices of the pair's matches.
+  Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();  ///< The homography, in normalised pixels.
+  bool is_same_image = false;                              ///< No point moves between the photos.
 };
 
-/// Normalised pixels: centre of the image 0, half its width 1.
+/// Normalisation of pixels: the image's centre is 0, half its width is 1.
 struct PhotoScale {
   double half_width_px = 1.0;
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
@@ -29,9 +29,9 @@ struct PhotoScale {
 /// image stitching using invariant features", 2007, section 3. Throws Interrupted.
 [[nodiscard]] std::vector<PhotoLink> find_links(const MatchedPhotos& photos, const Progress& progress = {});
 
-/// The largest set of photos that links join, with no link through the same image twice; the photo with most links
-/// first, the others in the order of a tree of the strongest links. `link_of[i]`: the link by which photo i joins one
-/// before it; −1 for the first.
+/// The largest set of photos that links connect, with no link through the same image twice; first the photo with the
+/// most links, then the others in the order of a tree of the strongest links. `link_of[i]` is the link that connects
+/// photo i to an earlier one; −1 for the first.
 struct PhotoTree {
   std::vector<int> photos, link_of;
 };

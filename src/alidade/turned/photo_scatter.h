@@ -4,13 +4,13 @@
 
 namespace alidade {
 
-/// Covariance of a fit whose errors are shared within photos (the hand moved, the shutter rolls, the focus walks).
+/// Covariance of a fit whose errors are shared within photos (hand motion, rolling shutter, changes of focus).
 /// Normalised.
 struct ScatterCovariance {
   TurnedInformation cov, cov_model;
-  double design_effect = 1.0;  ///< Of photos: the scatter over what the model expects of it.
+  double design_effect = 1.0;  ///< Scatter of the photos over its expectation by the model.
   double degrees_of_freedom = 0.0;
-  std::vector<double> z2;  ///< One per photo: |δ|² over what the model expects of it, in V's units.
+  std::vector<double> z2;  ///< One per photo: |δ|² over its expectation by the model, in units of V.
 };
 
 /// The change from omitting each photo, δ_k (one step from the optimum), relative to its expectation by the model,
@@ -20,11 +20,11 @@ struct ScatterCovariance {
 /// ratio for all, and widened by ν/(ν − 2). docs/maths/turned-photos.md.
 [[nodiscard]] ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progress = {});
 
-/// As unlikely as 3 σ are, in the σ of a term of the camera: the part that a few photos' scatter told has Student's
-/// tails (Abramowitz & Stegun 26.7.5), ν by Satterthwaite.
+/// The deviation, in σ of a camera term, that is as unlikely as 3 σ: the part of σ due to the scatter of a few photos
+/// has the tails of Student's distribution (Abramowitz & Stegun 26.7.5), ν by Satterthwaite.
 [[nodiscard]] double three_sigma_of(int term, const ScatterCovariance& scatter);
 
-/// Within that of zero.
+/// Whether a term is within that deviation of zero.
 [[nodiscard]] bool is_nearly_zero(int term, const TurnedFit& fit, const ScatterCovariance& scatter);
 
 }  // namespace alidade

@@ -11,11 +11,11 @@ struct KeptMatch {
   int match = 0;
 };
 
-/// The matches on which each link's photos agree, strongest link first.
+/// The matches that agree with each link's homography, strongest link first.
 [[nodiscard]] std::vector<KeptMatch> agreeing_matches(const std::vector<PhotoLink>& links);
 
-/// Of all matches between the bundle's photos those that its camera and rotations explain within `gate` (normalised),
-/// by transfer from one photo to the other. `bundle_place[photo]`: −1 for photos that take no part.
+/// The matches between the bundle's photos that its camera and rotations explain within `gate` (normalised), by
+/// transfer from one photo to the other. `bundle_place[photo]`: −1 for photos that are not used.
 [[nodiscard]] std::vector<KeptMatch> explained_matches(const MatchedPhotos& photos, const TurnedBundle& bundle,
                                                        const std::vector<int>& bundle_place, double gate);
 
@@ -24,8 +24,8 @@ struct KeptMatch {
 std::size_t set_tracks(const MatchedPhotos& photos, const std::vector<KeptMatch>& matches,
                        const std::vector<int>& bundle_place, TurnedBundle& bundle);
 
-/// Rejects observations whose freed residual is beyond `gate` (normalised), the worst of a track at a time, and
-/// tracks that fewer than two photos show. Returns how many observations went.
+/// Rejects observations whose freed_norms() exceeds `gate` (normalised), one per track at a time, the worst first, and
+/// tracks observed in fewer than two photos. Returns the number of rejected observations.
 std::size_t leave_out(const std::vector<Eigen::Vector2d>& residuals, double gate, TurnedBundle& bundle);
 
 }  // namespace alidade

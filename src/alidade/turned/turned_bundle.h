@@ -7,17 +7,17 @@
 
 namespace alidade {
 
-/// One point as one photo shows it.
+/// One point observed in one photo.
 struct TurnedDetection {
   int photo = 0, track = 0;
   Eigen::Vector2d px;  ///< Normalised.
 };
 
-/// Photos of a rotating camera, adjusted together. The observations are ordered by track.
+/// Photos of a rotating camera, adjusted jointly. The observations are ordered by track.
 struct TurnedBundle {
   TurnedCamera camera;
-  std::vector<Eigen::Matrix3d> cam_from_world;  ///< One per photo. The first one's is fixed: the world may rotate.
-  std::vector<double> log_zoom;                 ///< One per photo, the first one's is fixed.
+  std::vector<Eigen::Matrix3d> cam_from_world;  ///< One per photo. The first is fixed, as the world's rotation is free.
+  std::vector<double> log_zoom;                 ///< One per photo; the first is fixed.
   std::vector<Eigen::Vector3d> rays;            ///< One per track, unit length, in the world.
   std::vector<TurnedDetection> observations;
 };
@@ -28,21 +28,21 @@ struct TurnedBundle {
   return bundle.cam_from_world[to] * world_from_cam;
 }
 
-/// What is known of the camera before, as a normal distribution about `mean`.
+/// Prior of the camera, a normal distribution about `mean`.
 struct TurnedPrior {
   TurnedCamera mean = TurnedCamera::Zero();
   TurnedInformation information = TurnedInformation::Zero();
-  double zoom_information = 1e12;  ///< 1/σ² of each photo's log zoom; large: it is the same for all.
+  double zoom_information = 1e12;  ///< 1/σ² of each photo's log zoom; large: all photos have the same zoom.
 };
 
 struct TurnedSolveConfig {
-  double sigma_px = 1e-3;  ///< Normalised, of a coordinate.
-  double huber = 2.0;      ///< In σ of a residual.
+  double sigma_px = 1e-3;  ///< σ of a coordinate, normalised.
+  double huber = 2.0;      ///< Huber threshold, in σ of a residual.
   int max_iterations = 50;
-  double min_gain = 1e-8;  ///< Of the cost, as a share: less is the bottom.
+  double min_gain = 1e-8;  ///< Relative decrease of the cost below which the iteration ends.
 };
 
-/// Normal equations of camera and photos, the tracks' rays eliminated. Order: camera, then `per_photo` a photo.
+/// Normal equations of camera and photos, with the tracks' rays eliminated. Order: camera, then `per_photo` per photo.
 struct TurnedNormal {
   Eigen::MatrixXd information;
   Eigen::VectorXd gradient;
@@ -56,7 +56,7 @@ struct TurnedNormal {
 struct TurnedSolution {
   bool converged = false;
   int iterations = 0;
-  double cost = 0.0;  ///< Huber's, prior included, σ as given.
+  double cost = 0.0;  ///< Huber's cost, with the prior, for the given σ.
   std::vector<Eigen::Vector2d>
       residuals;  ///< Prediction minus pixel, one per observation, normalised; NaN where there is none.
 };
@@ -66,7 +66,7 @@ struct TurnedSolution {
 TurnedSolution solve_turned(TurnedBundle& bundle, const TurnedPrior& prior, const TurnedSolveConfig& config,
                             const Progress& progress = {});
 
-/// Each observation's residual over what its track leaves of it: √(1 − 1/m), m the track's observations. NaN as in
+/// Each observation's residual over √(1 − 1/m), the share that a track of m observations leaves of an error. NaN as in
 /// `residuals`.
 [[nodiscard]] std::vector<double> freed_norms(const TurnedBundle& bundle,
                                               const std::vector<Eigen::Vector2d>& residuals);

@@ -6,17 +6,17 @@
 
 namespace alidade {
 
-inline constexpr int num_camera = 10, per_photo = 4;  ///< A photo's: its rotation (3), the log of its zoom.
+inline constexpr int num_camera = 10, per_photo = 4;  ///< Per photo: its rotation (3) and log zoom.
 
-/// fx, fy, cx, cy, k1, k2, p1, p2, k3, k4. Pixels are normalised, (px − centre) / half width, and so are the first
-/// four.
+/// fx, fy, cx, cy, k1, k2, p1, p2, k3, k4. Pixels are normalised, (px − centre) / half width, and so are fx, fy, cx,
+/// cy.
 using TurnedCamera = Eigen::Matrix<double, num_camera, 1>;
 using TurnedInformation = Eigen::Matrix<double, num_camera, num_camera>;
-inline constexpr std::array<int, 4> radial_places{4, 5, 8, 9};  ///< Of k1 to k4 in it.
-inline constexpr int num_radial = 3;                            ///< That are estimated: k4 is only tested.
-inline constexpr int decentring_place = 6;                      ///< Of p1, before p2.
+inline constexpr std::array<int, 4> radial_places{4, 5, 8, 9};  ///< Indices of k1 to k4 in it.
+inline constexpr int num_radial = 3;                            ///< Estimated radial terms: k4 is only tested.
+inline constexpr int decentring_place = 6;                      ///< Index of p1; p2 follows.
 
-/// Pixel of a far point with its derivatives.
+/// Pixel of a far point, with its derivatives.
 struct TurnedPrediction {
   Eigen::Vector2d px;
   Eigen::Matrix<double, 2, num_camera> J_camera;

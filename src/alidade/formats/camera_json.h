@@ -7,10 +7,10 @@ namespace alidade {
 
 /// The `camera` of `estimate`: {model, width, height [px], fx, …}.
 [[nodiscard]] JsonValue camera_values(const Camera& camera);
-/// The same names with their σ; an empty object without a covariance.
+/// The σ of the same names; an empty object without a covariance.
 [[nodiscard]] JsonValue camera_stddev(const Camera& camera);
 
-/// True where the camera has a covariance of all its parameters.
+/// Whether the camera has a covariance of all its parameters.
 [[nodiscard]] bool has_covariance(const Camera& camera);
 
 }  // namespace alidade

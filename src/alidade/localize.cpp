@@ -23,7 +23,7 @@
 namespace alidade {
 namespace {
 
-/// The map of a table for another run to begin in: points by their numbers.
+/// The map of a table for use in a later run: points by their numbers.
 void save_numbered(Localization& result) {
   for (const MapPoint& point : result.map)
     if (const Eigen::Matrix3d cov = point.cov_in_map.value_or(point.cov);
@@ -31,7 +31,7 @@ void save_numbered(Localization& result) {
       result.saved_map.points.push_back({point.id, point.point_in_world, cov, {}});
 }
 
-/// Scale from sensors beside the camera.
+/// Scale from other sensors than the camera.
 void add_scale(const LocalizeConfig& config, Localization& result) {
   if (!result.is_scale_read) {
     read_scales(config, result.map, result);
@@ -44,7 +44,7 @@ void add_scale(const LocalizeConfig& config, Localization& result) {
   add_imu_scale(config, result);
 }
 
-/// What moved is where the path has it now.
+/// The new position of moved points is that in the path's map.
 void add_moved_points(const MovedMapPoints& moved, bool is_left_out, Localization& result) {
   std::vector<double> moves_m;
   for (std::size_t i = 0; i < moved.ids.size(); ++i) {
@@ -55,7 +55,7 @@ void add_moved_points(const MovedMapPoints& moved, bool is_left_out, Localizatio
   if (is_left_out && !moves_m.empty()) result.moved_points.median_m = median_of(std::move(moves_m));
 }
 
-/// A result that says no more than what was given.
+/// A result that contains only what was given.
 Localization described(const LocalizeConfig& config, const Camera& camera) {
   Localization result;
   result.camera = camera;
@@ -69,19 +69,19 @@ Localization described(const LocalizeConfig& config, const Camera& camera) {
   return result;
 }
 
-/// Whether σ of a pixel is for the observations to say.
+/// Whether σ of a pixel is to be estimated from the observations.
 bool seeks_sigma(const LocalizeConfig& config) {
   return !config.sigma_px && config.filter.sigma_px == LocalizationFilterConfig{}.sigma_px;
 }
 
-/// Whether innovations of a path that was solved with the usual σ are as small as a smaller one would have them. Errors
-/// that last are in no difference of few frames: where they are the larger ones the smaller σ is none.
+/// Whether the innovations of a path solved with the usual σ are small enough for a smaller one. Persistent errors
+/// cancel in differences of few frames: if they dominate, the smaller σ is wrong.
 bool suggests(const Localization& result, double smaller_px) {
-  constexpr double generous = 1.7, of_motion = 0.1;  // a motion that is trusted more than such pixels bends less
+  constexpr double generous = 1.7, of_motion = 0.1;  // a motion trusted more than such pixels adapts less
   return result.nis_per_dof < generous * std::pow(smaller_px / result.sigma_px, 2) + of_motion;
 }
 
-/// Whether a path that was solved with a found σ stands: what is left of it is such noise.
+/// Whether a path solved with an estimated σ is consistent: its residuals match that σ.
 bool bears_out(const Localization& result, bool is_larger) {
   constexpr double least_nis = 0.4, most_nis = 1.5;
   const State state = result.verdict.state;
@@ -91,22 +91,22 @@ bool bears_out(const Localization& result, bool is_larger) {
 
 }  // namespace
 
-/// The front ends point to config: it stays where it is.
+/// The front ends hold references to config: it must not move.
 struct Localizer::Run {
   Camera camera;
   LocalizeConfig config;
   std::optional<ObservationLocalizer> of_observations;
   std::optional<ImageLocalizer> of_images;
   std::vector<PathStep> path;
-  std::size_t num_judged = 0;  ///< Of them, by recent().
+  std::size_t num_judged = 0;  ///< Steps already judged by recent().
   bool seeks_sigma_px = false, sigma_px_is_found = false;
-  std::vector<ObservationFrame> given = {};  ///< For that; of a longer recording none.
-  std::optional<MovedMapPoints> moved = {};  ///< Of the map that an earlier run has left, and not in this one's.
+  std::vector<ObservationFrame> given = {};  ///< Frames to estimate it from; empty for longer recordings.
+  std::optional<MovedMapPoints> moved = {};  ///< Moved points of an earlier run's map; excluded from this run's.
 
   [[nodiscard]] double last_t_s() const {
     return path.empty() ? std::numeric_limits<double>::quiet_NaN() : path.back().t_s;
   }
-  /// Of the map, those that are not where it has them.
+  /// Points of the map that are no longer where it has them.
   [[nodiscard]] MovedMapPoints moved_points() const {
     if (moved) return *moved;
     if (!of_observations || !config.map) return {};
@@ -188,7 +188,7 @@ Verdict Localizer::recent() {
   return live_verdict(recent);
 }
 
-/// Where points of the map moved since it was made: all once more by the others.
+/// If points of the map have moved since it was made, solves again with the others.
 std::optional<Localization> Localizer::finished_without(MovedMapPoints moved, std::span<const TimedPose> truth) const {
   const Run& run = *run_;
   const std::vector<ObservationFrame> frames = run.of_observations->numbered_frames();
@@ -221,7 +221,7 @@ std::optional<Localization> Localizer::by_found_sigma(double found_px, std::span
   return result;
 }
 
-/// With the σ of a pixel that the frames show, where that is another one.
+/// Solves with the σ of a pixel estimated from the frames, if that differs from the usual one.
 Localization Localizer::with_sigma_sought(std::span<const ObservationFrame> frames, LocalizeConfig config,
                                           std::span<const TimedPose> truth, const Progress& progress,
                                           const std::function<Localization()>& by_usual) const {
@@ -255,7 +255,7 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
   return result;
 }
 
-/// With the σ of a pixel that push() has.
+/// Solves with the σ of a pixel that push() used.
 Localization Localizer::finished(std::span<const TimedPose> truth) const {
   const Run& run = *run_;
   const MovedMapPoints moved = run.moved_points();

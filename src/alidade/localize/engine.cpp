@@ -12,7 +12,7 @@ std::optional<StartHypothesis> LocalizeEngine::start_without_target() const {
   if (config_.start) return StartHypothesis{config_.start->motion, config_.start->cov};
   if (!config_.target.points.empty()) return std::nullopt;
   StartHypothesis origin;
-  constexpr double sure = 1e-6;  // the world is where the camera is; zero would leave no way to correct it
+  constexpr double sure = 1e-6;  // the world frame is the camera's; zero would leave no way to correct it
   origin.cov.diagonal().head<6>().setConstant(sure * sure);
   origin.cov.diagonal().segment<3>(6).setConstant(config_.sigma_speed_m_s * config_.sigma_speed_m_s);
   origin.cov.diagonal().tail<3>().setConstant(config_.sigma_rate_rad_s * config_.sigma_rate_rad_s);
@@ -28,8 +28,8 @@ void LocalizeEngine::begin(std::span<const StartHypothesis> starts, double t_s, 
   t_s_ = t_s;
 }
 
-/// Frame and scale are the known points' where nothing else is given of either, and where all of them stay. Depths so
-/// vague that hundreds of points say nothing of the scale beside a target are nothing.
+/// Whether the known points alone determine frame and scale: nothing else is given of either, and all of them stay in
+/// the filter. Depths too uncertain for hundreds of points to determine the scale beside a target do not count.
 bool LocalizeEngine::is_frame_the_targets() const {
   constexpr double vague = 0.25;
   const bool has_depths = config_.depth_m && config_.sigma_depth < vague;
@@ -43,7 +43,7 @@ ObservationsReport LocalizeEngine::update(std::span<const FeatureObservation> ob
 }
 
 void LocalizeEngine::predict_to(double t_s, double period_s) {
-  constexpr int max_steps = 1000;  // σ is as large as the world long before
+  constexpr int max_steps = 1000;  // long before that, σ is as large as the world
   const double gap_s = t_s - t_s_;
   const int num_steps = static_cast<int>(std::clamp(std::round(gap_s / period_s), 1.0, double{max_steps}));
   for (int i = 0; i < num_steps; ++i) bank_->predict(gap_s / num_steps);

@@ -12,16 +12,16 @@
 
 namespace alidade {
 
-/// A pose has six components, a point two.
+/// A pose has six components, an observation two.
 inline constexpr std::size_t min_observations = 3;
-/// Known points, of three components each: the others need their part of the state.
+/// Known points in the filter, three components each: the other points need their part of the state.
 inline constexpr std::size_t max_known_at_once = 100;
 
 /// The estimator behind localize(): the filters, and the state kept from frame to frame. Two front ends drive it, one
-/// for given observations, one that makes them from images.
+/// for given observations, one that extracts them from images.
 class LocalizeEngine {
  public:
-  /// `config` as resolved() gives it; it must live longer.
+  /// `config` as returned by resolved(); it must outlive this.
   LocalizeEngine(const Camera& camera, const LocalizeConfig& config) : camera_(camera), config_(config) {}
 
   [[nodiscard]] bool has_begun() const { return bank_.has_value(); }
@@ -30,30 +30,30 @@ class LocalizeEngine {
   [[nodiscard]] const LocalizationFilter& best() const { return bank_->best(); }
   [[nodiscard]] const Camera& camera() const { return camera_; }
 
-  /// The start that was given, or where there is no target the first camera as the world; none: from the target.
+  /// The given start, or without a target the first camera as the world frame; empty: the start is from the target.
   [[nodiscard]] std::optional<StartHypothesis> start_without_target() const;
-  /// σ of an observation and of speeds, for poses from the target.
+  /// σ of an observation and of velocities, for poses from the target.
   [[nodiscard]] KnownPoseConfig pose_config() const;
   void begin(std::span<const StartHypothesis> starts, double t_s, const FilterBankConfig& bank);
   void end() { bank_.reset(); }
-  /// With the observations of a frame.
+  /// Updates with the observations of a frame.
   ObservationsReport update(std::span<const FeatureObservation> observations);
-  /// In steps of a frame's period: accelerations are drawn again for each, also while frames are missing.
+  /// In steps of one frame period, each with independent accelerations, also across missing frames.
   void predict_to(double t_s, double period_s);
-  /// Pose, and what became of the observations; of them the target's, where the filter says so.
+  /// Fills the pose and the numbers of used and gated observations, in total and of known points.
   void fill(std::span<const FeatureObservation> observations, const ObservationsReport& report, PathStep& step) const;
   void fill_pose(PathStep& step) const;
-  /// What the last frames with it say of the path.
+  /// Doubt about the path from the last frames, including this one.
   [[nodiscard]] Doubt doubt_after(const PathStep& step) { return doubt_.after(step); }
   void forget_doubt() { doubt_.clear(); }
   void count_restart() { ++num_restarts_; }
-  /// Keeps residuals of an update, and at the end of a frame what is given to the filter.
+  /// Keeps residuals of an update and, at the end of a frame, the effect of the filter's given numbers.
   void keep_residuals(std::span<const FeatureObservation> observations, const ObservationsReport& report);
   void keep_given() { given_.add(best()); }
 
-  /// What the run has to say of its whole, from `result.path`. `num_used`: how often a point was used.
+  /// Fills the summary of the run from `result.path`. `num_used`: how often a point was used.
   void sum_up(const std::function<std::size_t(long id)>& num_used, Localization& result) const;
-  /// The same of `recent.path`, which has the steps since this was last asked.
+  /// The same from `recent.path`, which contains the steps since the last call.
   void sum_up_recent(const std::function<std::size_t(long id)>& num_used, Localization& recent);
 
  private:

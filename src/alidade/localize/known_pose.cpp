@@ -22,7 +22,7 @@ struct SeenPoints {
   double sigma_m = 0.0;
 };
 
-/// The known points that are seen, in the frame of the plane through them.
+/// The observed known points, in the frame of the plane through them.
 SeenPoints seen_points(std::span<const FeatureObservation> observations, std::span<const KnownPoint> known) {
   SeenPoints seen;
   std::vector<Eigen::Vector3d> points_in_world;
@@ -55,7 +55,7 @@ SeenPoints seen_points(std::span<const FeatureObservation> observations, std::sp
   return seen;
 }
 
-/// From the right perturbation of cam_from_board to position in the world and right rotation of world_from_cam.
+/// Converts a right perturbation of cam_from_board to position in the world and right rotation of world_from_cam.
 StartHypothesis start_of(const BoardPoseFit& fit, const SeenPoints& seen, const KnownPoseConfig& config) {
   const Rigid3 board_from_cam = fit.pose.cam_from_board.inverse();
   const Eigen::Matrix3d R = fit.pose.cam_from_board.rotation.toRotationMatrix();
@@ -73,7 +73,7 @@ StartHypothesis start_of(const BoardPoseFit& fit, const SeenPoints& seen, const 
   return start;
 }
 
-/// σ of a pixel with that of the point itself, seen from as far as the fit says.
+/// σ of a pixel including that of the point itself, at the distance of the fit.
 double effective_sigma_px(const Camera& camera, const BoardPoseFit& fit, double sigma_m, double sigma_px) {
   const double focal_px = params(camera.lens)[0];
   const double distance_m = fit.pose.cam_from_board.translation.norm();
@@ -88,14 +88,14 @@ std::vector<BoardPoseFit> fits_of(const Camera& camera, const SeenPoints& seen, 
                          effective_sigma_px(camera, fits.front(), seen.sigma_m, sigma_px));
 }
 
-constexpr double max_pose_chi2_per_dof = 6.9;  // 99.9 % of the two components that four points leave
+constexpr double max_pose_chi2_per_dof = 6.9;  // 99.9 % of the two degrees of freedom of four points
 constexpr double max_chi2 = 13.8;              // 99.9 % of a point's two
 
 bool agree(const std::vector<BoardPoseFit>& fits) {
   return !fits.empty() && fits.front().chi2 <= max_pose_chi2_per_dof * std::max(fits.front().dof, 2);
 }
 
-/// Those of all that fit a pose.
+/// All observations that fit a pose.
 BoardView fitting(const Camera& camera, const SeenPoints& seen, const BoardPoseFit& fit, double sigma_px) {
   const double sigma = effective_sigma_px(camera, fit, seen.sigma_m, sigma_px);
   BoardView view;
@@ -107,7 +107,7 @@ BoardView fitting(const Camera& camera, const SeenPoints& seen, const BoardPoseF
   return view;
 }
 
-/// Four of them, drawn; all sets of four where there are few.
+/// Random sets of four; all of them if there are few.
 std::vector<std::array<std::size_t, 4>> fours_of(std::size_t num) {
   constexpr std::size_t most = 48;
   std::vector<std::array<std::size_t, 4>> fours;
@@ -122,14 +122,14 @@ std::vector<std::array<std::size_t, 4>> fours_of(std::size_t num) {
   return fours;
 }
 
-/// How many have to agree on a pose: of more than five more than four, and half of all.
+/// Minimum number that must agree on a pose: more than four out of more than five, and half of all.
 std::size_t min_agreeing(std::size_t num) {
   constexpr std::size_t few = 5;
   return num <= few ? 4 : std::max<std::size_t>(few, (num + 1) / 2);
 }
 
-/// The poses that most observations agree on, where not all agree on one: from sets of four (M. A. Fischler & R. C.
-/// Bolles, "Random Sample Consensus", 1981). Four points fit chance poses.
+/// The poses on which most observations agree, if not all agree on one: RANSAC over sets of four (M. A. Fischler & R.
+/// C. Bolles, "Random Sample Consensus", 1981). Four points fit chance poses.
 std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& seen, double sigma_px) {
   const std::size_t num = seen.view.corners.size();
   BoardView best;
@@ -149,20 +149,20 @@ std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& s
   return fits;
 }
 
-/// Points on a line up to what they are known by: how the camera is rotated about it, and where it is, no pixel
-/// determines.
+/// Points that are collinear within their σ: the rotation of the camera about the line, and its position, are
+/// undetermined.
 bool is_line(const SeenPoints& seen) {
   constexpr double certain = 3.0, wide = 0.02;
   return seen.width_m < std::max(certain * seen.sigma_m, wide * seen.length_m);
 }
 
-/// Points in a plane up to what they are known by.
+/// Points that are coplanar within their σ.
 bool is_flat(const SeenPoints& seen) {
   constexpr double certain = 3.0, deep = 0.01;
   return seen.depth_m < std::max(certain * seen.sigma_m, deep * seen.length_m);
 }
 
-/// What is seen of the known points, as a resection takes it.
+/// The observed known points as input of a resection.
 std::vector<PlacedObservation> in_space(std::span<const FeatureObservation> observations,
                                         std::span<const KnownPoint> known, double sigma_px) {
   std::vector<PlacedObservation> placed;
@@ -175,7 +175,7 @@ std::vector<PlacedObservation> in_space(std::span<const FeatureObservation> obse
   return placed;
 }
 
-/// The start at a pose, with the covariance that the observations that fit give it.
+/// Start at a pose, with the covariance from the observations that fit.
 std::optional<StartHypothesis> start_at(const Camera& camera, std::span<const PlacedObservation> placed,
                                         const CameraResection& found, const KnownPoseConfig& config) {
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
@@ -200,10 +200,10 @@ std::optional<StartHypothesis> start_at(const Camera& camera, std::span<const Pl
   return start;
 }
 
-/// Of points in no plane: the poses that enough observations agree on, the likeliest first.
+/// For points that are not coplanar: the poses on which enough observations agree, most likely first.
 std::vector<StartHypothesis> poses_in_space(const Camera& camera, std::span<const PlacedObservation> placed,
                                             const KnownPoseConfig& config) {
-  constexpr int num_draws = 60;  // with 40 % mismatches one in five sets is right
+  constexpr int num_draws = 60;  // with 40 % mismatches one triple in five is correct
   constexpr std::size_t max_poses = 6;
   const std::size_t num = placed.size();
   if (num < 4) return {};
@@ -222,7 +222,7 @@ std::vector<StartHypothesis> poses_in_space(const Camera& camera, std::span<cons
     if (!is_twice) starts.push_back(*start);
   }
   std::ranges::stable_sort(starts, {}, &StartHypothesis::cost);
-  constexpr double other_cost = 13.8;  // a worse one has no part in it
+  constexpr double other_cost = 13.8;  // worse ones are negligible
   std::erase_if(starts, [&](const StartHypothesis& each) { return each.cost > starts.front().cost + other_cost; });
   return starts;
 }
@@ -234,7 +234,7 @@ std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<co
   const SeenPoints seen = seen_points(observations, known);
   if (is_line(seen)) return {};
   std::vector<BoardPoseFit> fits = fits_of(camera, seen, seen.view, config.sigma_px);
-  constexpr std::size_t max_for_sets = 40;  // a board's corners come from one finder: no mismatches among them
+  constexpr std::size_t max_for_sets = 40;  // a board's corners come from one detector: no mismatches among them
   const std::size_t num = seen.view.corners.size();
   if (!agree(fits) && num > 4 && num <= max_for_sets) fits = agreed_poses(camera, seen, config.sigma_px);
   std::erase_if(fits,

@@ -8,11 +8,11 @@
 
 namespace alidade {
 
-/// Where a camera is that sees these known points: of points in a plane (or nearly) both poses that a flat target
-/// nearly has, by maximum likelihood, the better one first, with their covariance; speeds zero with these σ. Of more
-/// than four points those that do not fit are rejected. Where no pose fits a plane through the points, and they are in
-/// none, poses from sets of three of them (three_point_pose.h). Empty where fewer than four are seen, they are on a
-/// line, or no pose fits (χ² beyond 99.9 %): observations that show another point.
+/// Camera poses from observations of known points. For (nearly) coplanar points both poses of the flat-target
+/// ambiguity, by maximum likelihood, the better one first, with covariance; velocities are zero with these σ. With more
+/// than four points outliers are rejected. If no pose fits a plane through the points and they are not coplanar, poses
+/// from triples of them (three_point_pose.h). Empty: fewer than four points, collinear, or no pose fits (χ² beyond 99.9
+/// %) because of mismatches.
 struct KnownPoseConfig {
   double sigma_px = 0.5;
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
@@ -22,8 +22,8 @@ struct KnownPoseConfig {
                                                             std::span<const KnownPoint> known,
                                                             const KnownPoseConfig& config = {});
 
-/// The same starts as initial guesses and no more: σ of the pose ten times as wide, all at the same cost. For when
-/// the observations that led to them follow as a measurement: a hundredth of them then counts twice, and not all.
+/// The same starts as mere initial guesses: σ of the pose multiplied by ten, all with the same cost. For observations
+/// that led to them and follow as a measurement: then only a hundredth of their information counts twice.
 [[nodiscard]] std::vector<StartHypothesis> only_where(std::vector<StartHypothesis> starts);
 
 }  // namespace alidade

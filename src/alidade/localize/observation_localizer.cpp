@@ -17,8 +17,8 @@ void ObservationLocalizer::keep_gap(double t_s) {
   t_s_ = t_s;
 }
 
-/// From the start that was given, or the poses from which the target looks so; without both the first camera is the
-/// world.
+/// Starts from the given start, or from the poses that the target gives; without both, the first camera defines the
+/// world frame.
 bool ObservationLocalizer::start(const ObservationFrame& frame) {
   std::vector<StartHypothesis> from;
   if (const auto start = engine_.start_without_target()) {
@@ -30,7 +30,7 @@ bool ObservationLocalizer::start(const ObservationFrame& frame) {
     from = only_where(std::move(from));
   }
   FilterBankConfig bank = config_.bank;
-  // With many points, and none that says how large the world is, speeds are nothing to choose among.
+  // With many points and unknown scale, splitting the speed prior is pointless.
   constexpr std::size_t many = 30;
   if (is_free() && frame.observations.size() >= many) bank.splits = 1;
   engine_.begin(from, frame.t_s, bank);
@@ -45,9 +45,9 @@ bool ObservationLocalizer::start(const ObservationFrame& frame) {
   return true;
 }
 
-/// Of many known points, as of a map, those that are seen; for them those leave that were not seen for longest. What
-/// was given of a point is news once: each time that it comes back it is given with twice the σ, so that all of them
-/// together say at most 1 + 1/4 + 1/16 + … = 4/3 of it.
+/// If there are too many known points, as from a map: enters those that are observed, in place of those not seen for
+/// longest. The given position of a point is information to be used once: each time it returns its σ is doubled, so
+/// that all of them together count at most 1 + 1/4 + 1/16 + … = 4/3 times.
 void ObservationLocalizer::enter_known(const ObservationFrame& frame) {
   constexpr double again = 2.0;
   if (known_.empty()) return;
@@ -74,7 +74,7 @@ void ObservationLocalizer::enter_known(const ObservationFrame& frame) {
   }
 }
 
-/// For one point more.
+/// Whether there is room for one more point.
 bool ObservationLocalizer::has_room() const {
   const LocalizationFilter& filter = engine_.best();
   if (!filter.has_room(config_.new_points == NewPoints::xyz ? 3 : 6)) return false;
@@ -83,21 +83,21 @@ bool ObservationLocalizer::has_room() const {
          static_cast<std::ptrdiff_t>(filter.features().size()) - num_known < config_.max_points;
 }
 
-/// What a point that is not seen now is worth: how much of a look at it would be news of the camera and not of the
-/// point (the pixel's variance over that with which it is expected), times how likely it is seen again soon (it is in
-/// the image or near it, and was seen lately).
+/// Value of a point that is not observed now: how much an observation of it would tell about the camera rather than the
+/// point (pixel variance over that of its prediction), times the probability that it is seen again soon (it is in or
+/// near the image, and was seen recently).
 double ObservationLocalizer::value_of(const Feature& feature) const {
   const auto expected = engine_.best().expected(feature.id);
   if (!expected) return 0.0;
   const double information = config_.filter.sigma_px * config_.filter.sigma_px / std::sqrt(expected->S.determinant());
   const Eigen::Array2d size(engine_.camera().width_px, engine_.camera().height_px), px = expected->px;
   const double outside = std::max({0.0, (-px / size).maxCoeff(), (px / size - 1.0).maxCoeff()});
-  constexpr double near_share = 0.25, half_life = 30.0;  // of the image's size; frames
+  constexpr double near_share = 0.25, half_life = 30.0;  // of the image size; frames
   const double age = static_cast<double>(num_taken_ - points_.last_frame(feature.id));
   return information * std::exp(-outside / near_share) * std::exp2(-age / half_life);
 }
 
-/// The points that may leave, the first first.
+/// The points that may leave, least useful first.
 std::vector<long> ObservationLocalizer::least_useful(const ObservationFrame& frame) const {
   constexpr double useful = 0.5;
   std::vector<std::pair<double, long>> worth;
@@ -121,8 +121,8 @@ void ObservationLocalizer::let_go(long id) {
   ++num_left_;
 }
 
-/// Where the filter is full, points that are of little use leave for those that are seen; they come back by their
-/// number.
+/// Adds observed points. If the filter is full, points of little use make room; they keep their number when they
+/// return.
 void ObservationLocalizer::add_new(const ObservationFrame& frame) {
   std::optional<std::vector<long>> leaving;
   std::size_t num_gone = 0;
@@ -140,7 +140,7 @@ void ObservationLocalizer::add_new(const ObservationFrame& frame) {
   }
 }
 
-/// Points that do not fit several times in a row leave; they may come again.
+/// Removes points that were gated several times in a row; they may enter again.
 void ObservationLocalizer::drop_strangers(const ObservationFrame& frame, const ObservationsReport& report) {
   for (std::size_t i = 0; i < frame.observations.size(); ++i) {
     if (!points_.is_stranger(frame.observations[i].id, report.outcomes[i], num_taken_)) continue;
@@ -149,10 +149,10 @@ void ObservationLocalizer::drop_strangers(const ObservationFrame& frame, const O
   }
 }
 
-/// Whether the motion leaves it open where most of the target's points are in the image: from there an update finds a
-/// pose that explains them, and not always the right one.
+/// Whether the predicted pixels of most target points are too uncertain: an update would find a pose that explains
+/// them, but not always the right one.
 bool ObservationLocalizer::is_vague(const ObservationFrame& frame) const {
-  constexpr double vague_share = 0.13;  // of the image's width
+  constexpr double vague_share = 0.13;  // of the image width
   const double vague_px = vague_share * engine_.camera().width_px;
   std::size_t num_seen = 0, num_vague = 0;
   for (const KnownPoint& point : config_.target.points) {
@@ -164,7 +164,7 @@ bool ObservationLocalizer::is_vague(const ObservationFrame& frame) const {
   return num_seen >= 4 && 2 * num_vague > num_seen;
 }
 
-/// Where the target says that the camera is, as far as the motion leaves that open.
+/// Restarts at the poses from the target, weighted by the motion prior.
 void ObservationLocalizer::place_by_target(const ObservationFrame& frame) {
   std::vector<StartHypothesis> from =
       poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config());
@@ -175,7 +175,7 @@ void ObservationLocalizer::place_by_target(const ObservationFrame& frame) {
   if (!from.empty()) engine_.filters().restart(from);
 }
 
-/// By the map's numbers.
+/// Replaces the points' numbers by the map's.
 ObservationFrame ObservationLocalizer::numbered(ObservationFrame frame) {
   const auto has_left = [&](long id) { return points_.is_gone(id) && !engine_.best().has(id); };
   for (FeatureObservation& observation : frame.observations)
@@ -196,7 +196,7 @@ PathStep ObservationLocalizer::take(const ObservationFrame& given) {
   return step;
 }
 
-/// Where the camera is at a frame before its observations are looked at; the first of them begin.
+/// Predicts the camera to a frame before its observations are used; the first frames start the path.
 FrameEvent ObservationLocalizer::come_to(const ObservationFrame& frame) {
   if (!engine_.has_begun()) return start(frame) ? FrameEvent::started : FrameEvent::waiting;
   engine_.predict_to(frame.t_s, period_s());

@@ -10,11 +10,11 @@
 
 namespace alidade {
 
-/// The front end for observations of numbered points: which points enter the map and leave it, when the target says
-/// that the path is wrong, and at the end the smoothed path.
+/// The front end for observations of numbered points: decides which points enter and leave the map, and when the target
+/// contradicts the path; smooths the path at the end.
 class ObservationLocalizer {
  public:
-  /// `config` as resolved() gives it; it must live longer.
+  /// `config` as returned by resolved(); it must outlive this.
   ObservationLocalizer(const Camera& camera, const LocalizeConfig& config)
       : engine_(camera, config),
         config_(config),
@@ -22,13 +22,13 @@ class ObservationLocalizer {
         frames_(static_cast<std::size_t>(config.max_smoothed)) {}
 
   PathStep take(const ObservationFrame& frame);
-  /// `result` has the path; the rest is filled in, and the path smoothed.
+  /// `result` contains the path; the rest is filled in, and the path is smoothed.
   void sum_up(Localization& result) const;
-  /// Of the frames in its path, the last ones since it was last asked: what the filter says of them.
+  /// Summary by the filter of the frames in its path, those since the last call.
   void sum_up_recent(Localization& recent);
-  /// As they are kept for it.
+  /// The frames as kept for smoothing.
   [[nodiscard]] const std::vector<ObservationFrame>& frames() const { return frames_.frames(); }
-  /// The same by the points' own numbers.
+  /// The same with the points' own numbers.
   [[nodiscard]] std::vector<ObservationFrame> numbered_frames() const;
 
  private:
@@ -37,7 +37,7 @@ class ObservationLocalizer {
   [[nodiscard]] ObservationFrame numbered(ObservationFrame frame);
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
   [[nodiscard]] bool start(const ObservationFrame& frame);
-  /// observation_repeats.cpp.
+  /// In observation_repeats.cpp.
   [[nodiscard]] bool shows_last(const ObservationFrame& frame);
   [[nodiscard]] bool should_move(const ObservationFrame& frame) const;
   [[nodiscard]] PathStep passed_over(const ObservationFrame& frame);
@@ -56,15 +56,15 @@ class ObservationLocalizer {
   [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame);
   [[nodiscard]] int num_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
   [[nodiscard]] bool is_no_chance(const ObservationFrame& frame, std::span<const StartHypothesis> from, Doubt doubt);
-  /// Neither the frame nor the scale of the world is given.
+  /// Whether neither the frame nor the scale of the world is given.
   [[nodiscard]] bool is_free() const { return !config_.start && config_.target.points.empty(); }
   [[nodiscard]] bool begin_again(Doubt doubt);
   [[nodiscard]] bool restart(const ObservationFrame& frame, Doubt doubt);
-  /// Where the target says that the camera is, against the path.
+  /// Camera poses from the target that contradict the path.
   struct OtherPlace {
     std::vector<StartHypothesis> from;
-    std::size_t num_explained = 0;  ///< Of firm points' observations, from there.
-    FilterBank before;              ///< As it was before the frame.
+    std::size_t num_explained = 0;  ///< Observations of firm points explained from there.
+    FilterBank before;              ///< The filters before this frame.
   };
   [[nodiscard]] std::optional<OtherPlace> other_place(const ObservationFrame& frame) const;
   [[nodiscard]] bool is_firm(long id) const;
@@ -74,11 +74,11 @@ class ObservationLocalizer {
                   const ObservationsReport& report, PathStep& step);
 
   [[nodiscard]] Recording recording(const KeptFrames& frames) const;
-  /// A path, and what it was solved from, where that is not all that was seen.
+  /// A path, and the frames from which it was solved, if these are not all.
   struct Solution {
     WholePath whole;
     std::optional<KeptFrames> few;
-    bool is_of_known = false;  ///< Known points alone.
+    bool is_of_known = false;  ///< From known points only.
   };
   [[nodiscard]] std::optional<Solution> solved(Localization& result) const;
 
@@ -87,16 +87,16 @@ class ObservationLocalizer {
   PointStore points_;
   PointEpisodes episodes_;
   ObservationRecord record_;
-  KeptFrames frames_;                 ///< Where the path is smoothed.
-  std::map<long, KnownPoint> known_;  ///< Of many those that are not all in the filter at once.
-  UsualGap gap_;                      ///< Between frames; where their period is not given.
+  KeptFrames frames_;                 ///< Input of path smoothing.
+  std::map<long, KnownPoint> known_;  ///< Known points, if too many to be in the filter at once.
+  UsualGap gap_;                      ///< Between frames, if their period is not given.
   double t_s_ = 0.0;                  ///< Of the last frame.
-  std::size_t num_taken_ = 0;         ///< Frames.
+  std::size_t num_taken_ = 0;         ///< Number of frames.
   std::vector<FeatureObservation> last_seen_;
-  std::size_t num_repeated_ = 0;  ///< Frames that showed the last one again.
-  std::size_t num_left_ = 0;      ///< Times that a point left a full filter.
+  std::size_t num_repeated_ = 0;  ///< Frames identical to the one before.
+  std::size_t num_left_ = 0;      ///< How often a point left a full filter.
   RepeatedPlaces elsewhere_;
-  std::size_t num_known_ = 0, num_known_gated_ = 0;  ///< Of the target's observations, at the poses taken.
+  std::size_t num_known_ = 0, num_known_gated_ = 0;  ///< Of the target's observations, at accepted poses.
 };
 
 }  // namespace alidade

@@ -3,7 +3,7 @@
 #include "alidade/localize/map/moved_part.h"
 #include "alidade/localize/observation_localizer.h"
 
-// What comes of all frames together.
+// Results from all frames together.
 
 namespace alidade {
 namespace {
@@ -34,8 +34,8 @@ std::vector<ObservationFrame> ObservationLocalizer::numbered_frames() const {
   return frames;
 }
 
-/// From one place what seems a parallax grows with the number of poses (frames/still_frames.h): where the camera hardly
-/// translates, some fifty frames are solved for, if need be of known points alone. An IMU's readings are of all frames.
+/// From one place the apparent parallax grows with the number of poses (frames/still_frames.h): if the camera hardly
+/// translates, only some fifty frames are used, if necessary with known points only. IMU readings need all frames.
 std::optional<ObservationLocalizer::Solution> ObservationLocalizer::solved(Localization& result) const {
   constexpr std::size_t enough = 50;
   const std::span<const KnownPoint> known = config_.target.points;
@@ -76,7 +76,7 @@ void ObservationLocalizer::sum_up(Localization& result) const {
   engine_.sum_up(kept.num_used, result);
   result.num_left = num_left_;
   take_over(whole, kept, engine_, config_, result);
-  if (solution && solution->is_of_known)  // from one place what a filter says of other points' depths is noise
+  if (solution && solution->is_of_known)  // from one place, a filter's depths of other points are noise
     std::erase_if(result.map, [](const MapPoint& point) { return !point.is_known; });
   join_episodes(episodes_, whole ? std::span<const long>(whole->smoothed.ids) : std::span<const long>(), result.map);
   result.known_shift = known_shift(result.map, target.points);

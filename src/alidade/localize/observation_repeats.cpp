@@ -3,11 +3,11 @@
 #include "alidade/estimation/median.h"
 #include "alidade/localize/observation_localizer.h"
 
-// Rows of a table that are those of the frame before once more.
+// Detection of rows of a table that repeat the frame before.
 
 namespace alidade {
 
-/// Whether all points are where they were in the last frame, to all digits: no tracker finds them so in two images.
+/// Whether all points are where they were in the last frame, to all digits: no tracker does that in two images.
 bool ObservationLocalizer::shows_last(const ObservationFrame& frame) {
   const std::vector<FeatureObservation>& now = frame.observations;
   const bool is_same =
@@ -19,7 +19,7 @@ bool ObservationLocalizer::shows_last(const ObservationFrame& frame) {
   return is_same;
 }
 
-/// Whether they are expected elsewhere now.
+/// Whether they are predicted elsewhere now.
 bool ObservationLocalizer::should_move(const ObservationFrame& frame) const {
   constexpr double still_px = 0.3;
   std::vector<double> moved_px;
@@ -29,7 +29,7 @@ bool ObservationLocalizer::should_move(const ObservationFrame& frame) const {
   return !moved_px.empty() && median_of(std::move(moved_px)) > still_px;
 }
 
-/// What shows where the camera was is no observation: the pose is the motion's.
+/// A repeated frame is not an observation: the pose is predicted from the motion.
 PathStep ObservationLocalizer::passed_over(const ObservationFrame& frame) {
   ++num_repeated_;
   PathStep step;

@@ -7,7 +7,7 @@
 #include "alidade/localize/observation_localizer.h"
 #include "alidade/localize/path/path_resection.h"
 
-// When the target says that the path is wrong, and where another begins.
+// Restarts: when the target contradicts the path, and where a new one starts.
 namespace alidade {
 
 /// χ² of six components.
@@ -20,7 +20,7 @@ double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const
 
 constexpr double max_contradiction = 22.5;  // χ² of six components: 99.9 %
 
-/// Where the camera is by the target, if that contradicts the path. Empty: it does not, or its observations fit no
+/// Poses from the target, if they contradict the path. Empty: they do not, or its observations fit no
 /// pose.
 std::vector<StartHypothesis> ObservationLocalizer::elsewhere(const ObservationFrame& frame) {
   std::vector<StartHypothesis> from =
@@ -34,7 +34,7 @@ std::vector<StartHypothesis> ObservationLocalizer::elsewhere(const ObservationFr
   return from;
 }
 
-/// How many of the target's observations a pose explains.
+/// Number of the target's observations that a pose explains.
 int ObservationLocalizer::num_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const {
   const double gate_px2 = 4.0 * config_.filter.gate * config_.filter.sigma_px * config_.filter.sigma_px;
   int num = 0;
@@ -47,9 +47,9 @@ int ObservationLocalizer::num_explained(const ObservationFrame& frame, const Rig
   return num;
 }
 
-/// Whether a place of the target's against the path is one: hardly any of its observations so far were mismatches,
-/// enough agree on it, or a frame before had the same correction of the path. Two frames before, where there is only
-/// some doubt.
+/// Whether a pose from the target that contradicts the path is no coincidence: hardly any of the target's observations
+/// so far were mismatches, enough of them agree on it, or an earlier frame gave the same correction of the path. Two
+/// earlier frames, if there is only some doubt.
 bool ObservationLocalizer::is_no_chance(const ObservationFrame& frame, std::span<const StartHypothesis> from,
                                         Doubt doubt) {
   constexpr int enough = 6;
@@ -60,7 +60,7 @@ bool ObservationLocalizer::is_no_chance(const ObservationFrame& frame, std::span
   return !has_mismatches || num_before > 0 || num_explained(frame, from.front().motion.world_from_cam) >= enough;
 }
 
-/// All but the target.
+/// Removes all points except the target's.
 void ObservationLocalizer::drop_map() {
   std::vector<long> unknown;
   for (const Feature& feature : engine_.best().features())
@@ -69,9 +69,9 @@ void ObservationLocalizer::drop_map() {
   points_.forget_gone();
 }
 
-/// From the target, where it says that the camera is somewhere else. Mismatches may look like another pose: where the
-/// observations that fit are not contradicted by themselves, it has to explain at least two more of the target's, and
-/// where there is only some doubt three frames have to say so. The map of points that led there is dropped.
+/// Restarts from the target, if it gives another pose. Mismatches may look like another pose: unless the observations
+/// that fit contradict each other, it must explain at least two more of the target's, and with only some doubt three
+/// frames must agree. The map of points that led there is dropped.
 bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
   constexpr int min_more = 2;
   std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);
@@ -89,10 +89,10 @@ bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
   return true;
 }
 
-/// Where observations contradict a path that nothing but itself holds: it and its map are given up, and another begins
-/// where it ends. What was seen before is located by the map that follows (observation_record.h).
+/// Gives up a path without external reference, and its map, if observations contradict it; a new one starts at its end.
+/// Earlier frames are localised in the new map (observation_record.h).
 bool ObservationLocalizer::begin_again(Doubt doubt) {
-  constexpr std::size_t enough_tried = 10, young = 200;  // frames; a path that was right for long is not given up
+  constexpr std::size_t enough_tried = 10, young = 200;  // frames; a path that was right for long is kept
   const std::size_t age = num_taken_ - record_.begun();
   if (!is_free() || (doubt != Doubt::strong && doubt != Doubt::many) || age < enough_tried || age > young) return false;
   StartHypothesis from = *engine_.start_without_target();
@@ -105,7 +105,7 @@ bool ObservationLocalizer::begin_again(Doubt doubt) {
   return true;
 }
 
-/// A point whose position no single look can change much: one of the target's, or a settled one. New ones explain
+/// A point whose position a single observation hardly changes: one of the target, or a converged one. New ones adapt to
 /// whatever the known ones do not contradict.
 bool ObservationLocalizer::is_firm(long id) const {
   const auto& features = engine_.best().features();
@@ -113,15 +113,15 @@ bool ObservationLocalizer::is_firm(long id) const {
   return feature != features.end() && (feature->is_known || feature->kind == FeatureKind::xyz);
 }
 
-/// Whether a pose found from there is that place, and not the path: the map leads a chance pose back to it.
+/// Whether the pose found from there is still that pose, not the path's: the map pulls a chance pose back to the path.
 bool ObservationLocalizer::is_there(const StartHypothesis& there, const Rigid3& found) const {
   const Eigen::Matrix<double, 6, 6> cov = there.cov.topLeftCorner<6, 6>();
   const auto away = [&](const Rigid3& from) { return squared_mahalanobis(pose_difference(found, from), cov); };
   return away(there.motion.world_from_cam) < away(engine_.best().motion().world_from_cam);
 }
 
-/// Where half of the target is not where the path, as it is now, expects it: where the target says that the camera is,
-/// with how much would be explained from there.
+/// If half of the target is outside the gates of the path's prediction: the pose from the target, with the number of
+/// observations that it would explain.
 std::optional<ObservationLocalizer::OtherPlace> ObservationLocalizer::other_place(const ObservationFrame& frame) const {
   const LocalizationFilter& filter = engine_.best();
   std::size_t num_seen = 0, num_off = 0;
@@ -149,8 +149,8 @@ std::optional<ObservationLocalizer::OtherPlace> ObservationLocalizer::other_plac
   return other;
 }
 
-/// There, if that explains more of the frame than the path did. Where the motion contradicts it, the motion ends there,
-/// and the map that it made is dropped.
+/// Restarts there, if that explains more of the frame than the path did. If the motion contradicts it, the motion ends
+/// there, and the map from it is dropped.
 bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& frame,
                                       const ObservationsReport& report) {
   std::size_t num_explained = 0;
@@ -173,7 +173,7 @@ bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& 
   return true;
 }
 
-/// Where the path is doubted, another begins: from the target, or from where it is.
+/// If the path is in doubt, restarts from the target or, without one, from the current pose.
 void ObservationLocalizer::heed_doubt(const ObservationFrame& frame, std::optional<OtherPlace> other, Doubt doubt,
                                       const ObservationsReport& report, PathStep& step) {
   if ((other && find_again(std::move(*other), frame, report)) || restart(frame, doubt)) {

@@ -19,7 +19,7 @@ namespace {
 
 using Sentences = std::vector<std::string>;
 
-/// What is believed at first of those of the lens's parameters that may be in the state: a stale calibration.
+/// Prior σ of lens parameters that may be in the state: a stale calibration.
 struct OnlineParameter {
   const char* name;
   double sigma;
@@ -27,7 +27,7 @@ struct OnlineParameter {
 constexpr std::array<OnlineParameter, 8> online{
     {{"fx", 8.0}, {"fy", 8.0}, {"cx", 6.0}, {"cy", 6.0}, {"k1", 0.05}, {"k2", 0.1}, {"p1", 0.02}, {"p2", 0.02}}};
 
-/// The values that a user does not set: their names and limits.
+/// Internal values that a user does not set: their names and limits.
 FieldList inner_fields(LocalizeConfig& config) {
   constexpr Limits positive{.min = 0.0, .is_above_min = true}, share{0.0, 1.0}, from_zero{.min = 0.0};
   constexpr Limits count{1.0, 1e6}, size{0.0, 1e6};
@@ -153,7 +153,7 @@ void add_faults(const Imu& imu, Sentences& found) {
     found.emplace_back("the mounting of the IMU is none");
 }
 
-/// Of the lens's parameters that are estimated: which there are.
+/// Faults of the list of estimated lens parameters.
 void add_lens_faults(const LocalizationFilterConfig& filter, const Camera& camera, Sentences& found) {
   const std::vector<int>& indices = filter.lens_params;
   if (indices.size() != filter.sigma_lens_params.size())
@@ -189,7 +189,7 @@ void put_lens_in_state(const Camera& camera, LocalizationFilterConfig& filter) {
   }
 }
 
-/// Numbered points are a target; what images show is looked for.
+/// Numbered points are used as a target; points from images are searched for.
 void take_map(const SavedMap& map, bool is_of_images, LocalizeTarget& target) {
   const bool has_looks =
       std::ranges::any_of(map.points, [](const SavedPoint& point) { return point.look.has_value(); });
@@ -200,7 +200,7 @@ void take_map(const SavedMap& map, bool is_of_images, LocalizeTarget& target) {
   if (!is_of_images) target.points = known_points(map);
 }
 
-/// Tens of matches a frame, and room for as many features as there may be.
+/// Configuration for tens of matches per frame, with room for the maximum number of features.
 LocalizationFilterConfig image_filter(const LocalizeConfig& config) {
   LocalizationFilterConfig filter = for_images(config.filter, config.features.sigma_floor_px);
   const auto num_known = static_cast<int>(config.map ? max_saved_at_once : config.target.points.size());
@@ -220,7 +220,7 @@ void add_field_faults(const LocalizeConfig& config, Sentences& found) {
   for (std::string& fault : faults_of(inner_fields(copy))) found.push_back(std::move(fault));
 }
 
-/// Of the sensors beside the camera.
+/// Faults of the readings of other sensors.
 void add_reading_faults(const LocalizeConfig& config, Sentences& found) {
   if (!std::ranges::all_of(config.depth_readings, [](const DepthReading& reading) {
         return std::isfinite(reading.t_s + reading.depth_m) && reading.sigma_m > 0.0 && std::isfinite(reading.sigma_m);

@@ -7,8 +7,8 @@
 
 namespace alidade {
 
-/// Running median of the time between frames: of the gaps so far (of an even number the upper one), by two
-/// heaps, so that a frame costs no more the more there were.
+/// Running median of the time between frames, over all gaps so far (the upper one of an even number), with two heaps:
+/// the cost per frame does not grow with their number.
 class UsualGap {
  public:
   void add(double gap_s) {
@@ -24,9 +24,9 @@ class UsualGap {
       lower_.push(upper_.top());
       upper_.pop();
     }
-    // Of an even number both heaps are as large; of an odd one the upper has one more: its top is the median.
+    // With an even number both heaps have the same size; with an odd one the upper has one more: its top is the median.
   }
-  /// 1 where there is none yet.
+  /// 1 if there is none yet.
   [[nodiscard]] double s() const { return upper_.empty() ? 1.0 : std::max(upper_.top(), 1e-9); }
 
  private:

@@ -14,14 +14,14 @@
 namespace alidade {
 namespace {
 
-constexpr double little = 0.5;  // of the camera's rates: less in common with the IMU's is chance
+constexpr double little = 0.5;  // of the camera's rates: less correlation with the IMU's is chance
 
 struct ForceSize {
   double mean = 0.0;    ///< Over gravity.
   double spread = 0.0;  ///< Over the mean.
 };
 
-/// How large forces are, of the readings that are of the path's time.
+/// Magnitude of the forces, over the readings within the path's time span.
 std::optional<ForceSize> force_size(const Imu& imu, std::span<const TimedPose> path) {
   double sum = 0.0, squares = 0.0, num = 0.0;
   for (const ImuReading& reading : imu.readings) {
@@ -36,7 +36,7 @@ std::optional<ForceSize> force_size(const Imu& imu, std::span<const TimedPose> p
   return ForceSize{mean / imu.gravity_m_s2, std::sqrt(variance) / std::max(mean, 1e-9)};
 }
 
-/// Forces in g are gravity, most of them, and of nearly one size; accelerations alone are not.
+/// Forces in g are mostly gravity, with nearly constant magnitude; accelerations without gravity are not.
 ImuFault force_fault(const ForceSize& force) {
   constexpr double near = 0.3, in_g = 1.0 / 9.81, none = 0.3, nearly_one_size = 0.25;
   if (std::abs(force.mean - 1.0) < near) return ImuFault::none;
@@ -44,7 +44,7 @@ ImuFault force_fault(const ForceSize& force) {
   return force.mean < none ? ImuFault::no_gravity : ImuFault::force_unit;
 }
 
-/// What is wrong with the rates, as far as the camera rotates.
+/// Fault of the rates, as far as the camera's rotations reveal it.
 ImuFault rates_fault(const RateMatch& match, ImuEstimate& estimate) {
   constexpr double hardly_rad_s = 0.02, certain_chi2 = 30.0, near = 0.05, certain = 5.0;
   if (match.num == 0) return ImuFault::other_time;
@@ -57,7 +57,7 @@ ImuFault rates_fault(const RateMatch& match, ImuEstimate& estimate) {
   return ImuFault::none;
 }
 
-/// The mounting that was given, if the rotations do not contradict it; else theirs.
+/// Uses the given mounting, if the rotations do not contradict it; else the estimated one.
 ImuFault mount(const Imu& imu, const RateMatch& match, ImuEstimate& estimate) {
   constexpr double certain_chi2 = 30.0, most_sigma_rad = 0.1;
   const Eigen::Matrix3d information = match.information;
@@ -66,11 +66,11 @@ ImuFault mount(const Imu& imu, const RateMatch& match, ImuEstimate& estimate) {
     estimate.cam_from_imu = imu.mounting->cam_from_imu;
     const Eigen::Vector3d off = log_so3(estimate.cam_from_imu.rotation * match.cam_from_imu.conjugate());
     const double given = imu.mounting->sigma_rotation_rad * imu.mounting->sigma_rotation_rad;
-    // (H⁻¹ + σ² I)⁻¹, also where H is of no full rank.
+    // (H⁻¹ + σ² I)⁻¹, also valid if H is rank-deficient.
     const Eigen::Matrix3d weight =
         (Eigen::Matrix3d::Identity() + given * information).partialPivLu().solve(information);
     estimate.angle_rad = off.norm();
-    if (match.explained < little) return ImuFault::none;  // of a camera that hardly rotates
+    if (match.explained < little) return ImuFault::none;  // a camera that hardly rotates
     if (!(off.dot(weight * off) > certain_chi2)) return ImuFault::none;
     estimate.cam_from_imu.rotation = match.cam_from_imu;
     return ImuFault::mounting;
@@ -80,12 +80,12 @@ ImuFault mount(const Imu& imu, const RateMatch& match, ImuEstimate& estimate) {
   return least > 1.0 / (most_sigma_rad * most_sigma_rad) ? ImuFault::none : ImuFault::unmounted;
 }
 
-/// Three nodes of the path with the steps between them: D = λ (m − arm) + h Rᵀ γ + J β, with λ = 1/scale, γ = λ g and
-/// β = λ times the bias of the forces.
+/// Three nodes of the path with the steps between them: D = λ (m − arm) + h Rᵀ γ + J β, with λ = 1/scale, γ = λ g and β
+/// = λ times the bias of the forces.
 struct AlignmentRow {
   Eigen::Vector3d D;
   Eigen::Matrix<double, 3, 7> J;
-  Eigen::Vector3d force_in_world;  ///< Its mean over the first step.
+  Eigen::Vector3d force_in_world;  ///< Mean over the first step.
   double weight = 1.0;
 };
 
@@ -128,7 +128,7 @@ struct AlignmentFit {
 
 enum class Gravity { free, known };
 
-/// Gravity's size, and the bias's, as far as they are known, about its direction `before`.
+/// With Gravity::known: priors of the magnitudes of gravity, linearised at the direction in `before`, and of the bias.
 std::optional<AlignmentFit> fit(std::span<const AlignmentRow> rows, const Imu& imu, Gravity gravity,
                                 const AlignmentFit* before) {
   Eigen::Matrix<double, 7, 7> H = Eigen::Matrix<double, 7, 7>::Zero();
@@ -149,7 +149,7 @@ std::optional<AlignmentFit> fit(std::span<const AlignmentRow> rows, const Imu& i
     H += variance / std::pow(lambda * imu.sigma_gravity_m_s2, 2) * of_gravity * of_gravity.transpose();
     H.diagonal().tail<3>().array() += variance / std::pow(lambda * imu.noise.sigma_force_bias, 2);
   } else {
-    H.diagonal().tail<3>().array() += 1e-3 * H.diagonal().tail<3>().sum();  // of a camera that hardly rotates
+    H.diagonal().tail<3>().array() += 1e-3 * H.diagonal().tail<3>().sum();  // for a camera that hardly rotates
   }
   const Ldlt ldlt(H);
   if (!(ldlt.min_pivot() > 0.0)) return std::nullopt;
@@ -161,11 +161,11 @@ std::optional<AlignmentFit> fit(std::span<const AlignmentRow> rows, const Imu& i
 void weigh(std::vector<AlignmentRow>& rows, const AlignmentFit& at) {
   std::vector<double> sizes;
   for (const AlignmentRow& row : rows) sizes.push_back((row.D - row.J * at.x).norm());
-  const double usual = 3.0 * median_of(sizes) + 1e-12;  // of three components the median is 1.5σ
+  const double usual = 3.0 * median_of(sizes) + 1e-12;  // the median of three components is 1.5σ
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].weight = 1.0 / (1.0 + std::pow(sizes[i] / usual, 2));
 }
 
-/// Why forces determine no scale: in the world they are constant where a camera does not accelerate.
+/// Reason why forces do not determine the scale: in the world frame they are constant if a camera does not accelerate.
 ImuFault undetermined(std::span<const AlignmentRow> rows) {
   constexpr double hardly_m_s2 = 0.2;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -175,7 +175,7 @@ ImuFault undetermined(std::span<const AlignmentRow> rows) {
   return squares < hardly_m_s2 * hardly_m_s2 * static_cast<double>(rows.size()) ? ImuFault::still : ImuFault::misfit;
 }
 
-/// Scale, gravity and the forces' bias.
+/// Estimates scale, gravity and the force bias.
 ImuFault find_scale(const Imu& imu, std::span<const ImuReading> readings, std::span<const TimedPose> path,
                     ImuEstimate& estimate) {
   std::vector<AlignmentRow> rows = rows_of(readings, path, estimate.rate_bias, estimate.cam_from_imu.translation);

@@ -9,18 +9,18 @@
 
 namespace alidade {
 
-/// Initial alignment of an IMU with a path of unknown scale or in metres; or the fault of its readings.
-/// Clock and rotation of the mounting by the rates of both (W. Kabsch, "A solution for the
-/// best rotation to relate two sets of vectors", Acta Cryst. A32, 1976); then scale, gravity and the forces' bias by
-/// linear least squares over steps of a quarter of a second (as T. Qin et al., "VINS-Mono", TRO 34(4), 2018, §V.B, for
-/// the inverse of the scale, whose coefficients are the IMU's and hardly noisy).
+/// Initial alignment of an IMU with a path of unknown scale or in metres; or the fault of its readings. Clock offset
+/// and mounting rotation from both angular rates (W. Kabsch, "A solution for the best rotation to relate two sets of
+/// vectors", Acta Cryst. A32, 1976); then scale, gravity and force bias by linear least squares over steps of a quarter
+/// of a second (as T. Qin et al., "VINS-Mono", TRO 34(4), 2018, §V.B, but for the inverse of the scale, whose
+/// coefficients are from the IMU and hardly noisy).
 struct ImuAlignment {
   ImuEstimate estimate;  ///< scale, late_s, mounting, biases in the camera's axes, gravity; σ of the scale.
-  std::vector<ImuReading> readings;  ///< In the camera's axes and at its times.
+  std::vector<ImuReading> readings;  ///< In the camera's axes and on its clock.
 };
 [[nodiscard]] ImuAlignment align_imu(const Imu& imu, std::span<const TimedPose> path);
 
-/// Longest time without readings that is bridged.
+/// Longest gap in the readings that is bridged.
 [[nodiscard]] double max_imu_gap_s(std::span<const ImuReading> readings);
 
 }  // namespace alidade

@@ -12,14 +12,14 @@ namespace {
 using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
 
-/// What a step says once corrected, with its derivatives by the biases at its time.
+/// A weighted step after correction, with its derivatives with respect to the biases and the clock.
 struct Corrected {
   Vector3 value;
   Matrix3 by_rate, by_force;
   Vector3 by_time;
 };
 
-/// Σ of velocity and position by shares, in the given mounting's axes, at the state's biases and clock.
+/// Weighted sum of velocity and position, in the axes of the given mounting, at the state's biases and clock.
 Corrected corrected(const ImuStepAt& at, const ImuState::Bias& bias, double late_s, double of_velocity,
                     double of_position) {
   const ImuStep& step = at.step;
@@ -93,7 +93,7 @@ ImuRows rotation_rows(const ImuStepAt& at, std::span<const Rigid3, 2> world_from
   const Matrix3 inverse = right_jacobian(rows.error).inverse();
   rows.J_poses.middleCols<3>(3) = -inverse * between_them.toRotationMatrix().transpose();
   rows.J_poses.middleCols<3>(9) = inverse;
-  // A change δ of `read` on its right moves the error by −J⁻¹ Eᵀ δ.
+  // A right perturbation δ of `read` changes the error by −J⁻¹ Eᵀ δ.
   const Matrix3 by_read = -inverse * E.toRotationMatrix().transpose();
   const Matrix3 turn = imu.turn.toRotationMatrix();
   const Matrix3 by_more = by_read * turn * right_jacobian(more);
@@ -159,7 +159,7 @@ double rotation_variance(const ImuStep& step, const ImuNoise& noise) {
 
 double force_variance(const ImuStep& first, const ImuStep& second, const ImuNoise& noise) {
   const double of_force = noise.force_density * noise.force_density * 0.5 * (first.dt_s + second.dt_s);
-  // Within a step the force is rotated by the gyroscope alone.
+  // Within a step the force is rotated by the gyroscope only.
   constexpr double usual_force_m_s2 = 9.8;
   const double tilt = usual_force_m_s2 * noise.rate_density;
   return of_force + tilt * tilt * (std::pow(first.dt_s, 3) + std::pow(second.dt_s, 3)) / 3.0;

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// ∫ rate dt from the first reading on, and so its mean between any two times without a gap between them.
+/// ∫ rate dt from the first reading on; gives the mean between any two times without a gap between them.
 class RateIntegral {
  public:
   explicit RateIntegral(std::span<const ImuReading> readings) : readings_(readings) {
@@ -33,7 +33,7 @@ class RateIntegral {
     Eigen::Vector3d angle = Eigen::Vector3d::Zero();
     std::size_t num_gaps = 0;
   };
-  /// None within a gap.
+  /// Empty within a gap.
   [[nodiscard]] std::optional<Sum> at(double t_s) const {
     const auto after = std::ranges::upper_bound(readings_, t_s, {}, &ImuReading::t_s);
     if (after == readings_.begin() || after == readings_.end()) return std::nullopt;
@@ -54,7 +54,7 @@ struct CameraRate {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
 };
 
-/// One after the other: neighbours that overlap would not be independent.
+/// Consecutive intervals: overlapping ones would not be independent.
 std::vector<CameraRate> camera_rates(std::span<const TimedPose> path) {
   constexpr double long_enough_s = 0.095, too_long_s = 0.5;
   constexpr std::size_t most = 1000;
@@ -79,7 +79,7 @@ struct Moments {
   Eigen::Matrix3d cam_imu = Eigen::Matrix3d::Zero(), imu_imu = Eigen::Matrix3d::Zero();
   double cam_cam = 0.0;
 
-  /// What is left of the camera's squares by the best linear function of the IMU's.
+  /// Residual sum of squares of the camera's rates after the best linear function of the IMU's.
   [[nodiscard]] double left() const {
     Eigen::Matrix3d H = imu_imu;
     constexpr double hardly = 1e-9;
@@ -110,7 +110,7 @@ Moments moments(std::span<const CameraRate> rates, const RateIntegral& integral,
   return sums;
 }
 
-/// The clock at which least is left, by a grid, then by the parabola through its neighbours.
+/// The clock offset with the least residual, by a grid and a parabola through the best one's neighbours.
 void find_clock(std::span<const CameraRate> rates, const RateIntegral& integral, RateMatch& match) {
   constexpr double most_s = 1.0, step_s = 0.01;
   constexpr int num_steps = static_cast<int>(most_s / step_s + 0.5);
@@ -133,7 +133,7 @@ void find_clock(std::span<const CameraRate> rates, const RateIntegral& integral,
   const double bend = before - 2.0 * least + after;
   if (!(bend > 0.0) || !(before + after < 1e299)) return;
   const double offset = 0.5 * (before - after) / bend;
-  // Of a mean of squares Q/N with its noise σ² = Q/(3N): σ_t² = 2 σ² / Q″.
+  // For the mean square Q/N, with noise σ² = Q/(3N): σ_t² = 2 σ² / Q″.
   const double noise = std::max(least - bend * 0.5 * offset * offset, 1e-12) / 3.0;
   match.sigma_late_s = step_s * std::sqrt(2.0 * noise / (bend * static_cast<double>(rates.size())));
   match.late_s = step_s * (best + offset);
@@ -141,8 +141,8 @@ void find_clock(std::span<const CameraRate> rates, const RateIntegral& integral,
 
 constexpr double unsure_s = 0.05;
 
-/// Whether the clock is later and later, by the clocks of parts of the path, each found by itself: a straight line
-/// through them, where that is clear and leaves nothing.
+/// Drift of the clock, from independent offsets of parts of the path: a straight line through them, if its slope is
+/// significant.
 void find_clock_rate(std::span<const CameraRate> rates, const RateIntegral& integral, RateMatch& match) {
   constexpr std::size_t part_of = 40, fewest = 3, most = 12;
   const std::size_t num_parts = std::min(rates.size() / part_of, most);

@@ -12,19 +12,19 @@ namespace alidade {
 /// Input of the controller of one axis at one sample.
 struct AxisInput {
   double encoder_rad = 0.0;
-  double error_rad = 0.0;  ///< Of the newest image: focal-normalised offset of the target, > 0 towards + angle.
-  /// Where the axis should point from the moment at which a command acts, a sample apart; none: stay.
+  double error_rad = 0.0;  ///< From the newest image: offset of the target over the focal length, > 0 towards + angle.
+  /// Where the axis should point from the time a command takes effect, one sample apart; none: stay.
   std::optional<Eigen::Vector<double, mpc_horizon + 1>> wanted_rad;
   Eigen::Vector<double, mpc_horizon + 1> wanted_rate_rad_s = Eigen::Vector<double, mpc_horizon + 1>::Zero();
 };
 
 /// From errors and predictions of one axis to its commands; docs/maths/servo.md, section "Controllers". Gains in
-/// radians. Allocates nothing once made.
+/// radians. Allocates no memory after construction.
 class AxisController {
  public:
   AxisController(const ServoConfig& config, const ServoAxis& axis, double focal_px);
 
-  /// Call once a period; the first call takes the encoder's reading as the start.
+  /// To be called once per period; the first call uses the encoder reading as the initial state.
   double command(const AxisInput& input);
 
  private:
@@ -40,7 +40,7 @@ class AxisController {
   Eigen::RowVector2d lqr_gain_;
   AxisMpc mpc_;
   AxisObserver observer_;
-  DelayedAxis expected_;  ///< How the axis would move if it were as known: what feedforward compares with.
+  DelayedAxis expected_;  ///< Motion of the axis if it were as known: the reference of feedforward.
   double dead_band_;
   double integral_ = 0.0;
   bool has_started_ = false;

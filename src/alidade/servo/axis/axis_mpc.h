@@ -9,20 +9,20 @@ namespace alidade {
 inline constexpr int mpc_horizon = 10;
 using Horizon = Eigen::Vector<double, mpc_horizon>;
 
-/// Commands of the next 10 samples that make Σ (angle − wanted)² + weight · effect² · Σ (command − that which would
-/// stay on the wanted angles)² least, while rate, acceleration and angle stay within what the axis can do. Condensed
+/// Commands of the next 10 samples that minimise Σ (angle − wanted)² + weight · effect² · Σ (command − the command that
+/// stays on the wanted angles)², subject to limits of rate, acceleration and angle. Condensed
 /// quadratic programme; its dual by coordinate ascent, in fixed memory: C. Hildreth, "A quadratic programming
 /// procedure", 1957; bounds on both sides: A. Lent & Y. Censor, 1980.
 class AxisMpc {
  public:
   AxisMpc(const ServoAxis& axis, const AxisModel& model, double command_weight);
 
-  /// From this state and with this disturbance of the command; `wanted[0]` is now, `wanted[i]` i samples later, with
-  /// the rate now. The first command; what the axis can do is never exceeded by it.
+  /// From this state and with this disturbance of the command; `wanted[0]` is now, `wanted[i]` is i samples later, with
+  /// the current rate. Returns the first command; it never exceeds the limits of the axis.
   [[nodiscard]] double command(const Eigen::Vector2d& state, double disturbance,
                                const Eigen::Vector<double, mpc_horizon + 1>& wanted_rad,
                                const Eigen::Vector<double, mpc_horizon + 1>& wanted_rate_rad_s);
-  [[nodiscard]] int sweeps() const { return sweeps_; }  ///< Of the last command.
+  [[nodiscard]] int sweeps() const { return sweeps_; }  ///< For the last command.
 
  private:
   static constexpr int num_rows = 3 * mpc_horizon;  // effort, acceleration, angle

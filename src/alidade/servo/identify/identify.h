@@ -15,7 +15,7 @@ struct ServoParam {
   enum Place { gain, tau, latency, zero, start };
 };
 
-/// exp(−dt/τ) and 1 − exp(−dt/τ) over the steps of a log: a regular one has two lengths, but for rounding.
+/// exp(−dt/τ) and 1 − exp(−dt/τ) over the steps of a log: a regular one has two step lengths, up to rounding.
 class Decay {
  public:
   explicit Decay(double tau_s) : tau_s_(tau_s) {}
@@ -37,24 +37,24 @@ class Decay {
   std::array<Values, 2> known_{};
 };
 
-/// Angles that a servo of these parameters reads at the times of a log, and their derivatives. Exact for piecewise
-/// constant commands: from one instant to the next in closed form, a switch of the command moving with the latency.
-/// Before the log the first command is taken to have been there.
+/// Angles that a servo with these parameters reads at the times of a log, and their derivatives. Exact for piecewise
+/// constant commands: closed form from one instant to the next, with the switching times shifted by the latency.
+/// Before the log the first command is assumed to have been in effect.
 struct ServoResponse {
   Eigen::VectorXd angle_rad;
   Eigen::Matrix<double, Eigen::Dynamic, num_servo_params> J;
 };
 [[nodiscard]] ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params);
 
-/// Least squares over both kinds of plant, from a search over time constant and latency (the rest is linear) refined by
-/// Gauss–Newton with analytic derivatives. The rate plant is selected where its residuals are clearly smaller.
+/// Least squares for both kinds of plant, by a search over time constant and latency (the rest is linear) refined by
+/// Gauss–Newton with analytic derivatives. The rate plant is selected if its residuals are clearly smaller.
 /// G. H. Golub & V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least squares problems whose
-/// variables separate", 1973. A given kind is used. Where the residuals indicate it, nonlinearities are estimated as
-/// well: freed one after the other, each where its evidence justifies its parameter. At least 8 rows, in order of time.
+/// variables separate", 1973. A given kind is used. If the residuals indicate it, nonlinearities are estimated as
+/// well: freed one by one, if the evidence justifies the parameter. At least 8 rows, in chronological order.
 [[nodiscard]] ServoIdentification identify_servo(std::span<const ServoSample> log,
                                                  ServoKindRule rule = ServoKindRule::automatic);
 
-/// Whether the model is accepted; otherwise what the log lacks.
+/// Whether the model is accepted; if not, what the log lacks.
 [[nodiscard]] Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified);
 
 }  // namespace alidade

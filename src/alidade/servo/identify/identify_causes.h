@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// One flaw, how large it seems, and its score in σ.
+/// One nonlinearity, its apparent size, and its score in σ.
 struct ServoCause {
   std::string name;  ///< "a limit of its rate"
   double size = 0.0;
@@ -17,26 +17,26 @@ struct ServoCause {
   double sigmas = 0.0;
 };
 
-/// Score tests of the flaws that were not freed: of a few sizes each, what they add to the response regressed on the
-/// residuals with the parameters following. The one that explains most, first.
+/// Score tests of the nonlinearities that were not freed: for a few sizes each, their effect on the response regressed
+/// on the residuals with the parameters following. The one that explains most comes first.
 [[nodiscard]] std::vector<ServoCause> servo_causes(std::span<const ServoSample> log,
                                                    const ServoIdentification& identified);
 
-/// Sizes of command that the log has, whatever their sign: of those that differ by a tenth, up to `most`. Of one size
-/// alone, a limit that it runs into is another gain.
+/// Number of absolute command sizes in the log that differ by a tenth, up to `most`. With a single size,
+/// a limit that it reaches looks like another gain.
 [[nodiscard]] std::size_t num_sizes(std::span<const ServoSample> log, std::size_t most);
 
-/// The step of the encoder where the angles are its whole multiples; 0: not seen.
+/// Resolution of the encoder, if all angles are multiples of it; 0: none found.
 [[nodiscard]] double encoder_step_rad(std::span<const ServoSample> log);
 
 /// Includes in the fit's covariance the effect of a dead band and backlash of typical sizes that the log hardly shows:
-/// each with its prior σ, less the information of the residuals (Schmidt–Kalman's consider parameters).
-/// `inverse`: (JᵀJ)⁻¹ of the parameters and freed flaws, whose derivatives are J. They are listed in `counted`.
+/// each with its prior σ and the information of the residuals (considered parameters, Schmidt–Kalman).
+/// `inverse`: (JᵀJ)⁻¹ of the parameters and freed nonlinearities, with derivatives J. They are listed in `counted`.
 void count_ordinary_flaws(std::span<const ServoSample> log, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse,
                           ServoIdentification& result);
 
-/// The time from which on gain, time constant or latency are others, if two plain fits, one to each part of the log,
-/// leave white residuals and explain clearly more than what is believed. None of held encoders.
+/// The time of a change of gain, time constant or latency, if two plain fits, one to each part of the log,
+/// leave white residuals and explain clearly more than the selected model. None for encoders that hold values.
 [[nodiscard]] std::optional<ServoChange> servo_change(std::span<const ServoSample> log, const ServoFit& believed);
 
 /// "the latency from 63 to 93 ms".

@@ -25,107 +25,107 @@ struct ServoFlaw {
     command_limit,
     rate_offset,
     soft_rate_limit,
-    resonance,  ///< Its frequency; the next two go with it.
+    resonance,  ///< Its frequency; the next two belong to it.
     resonance_damping,
     resonance_share
   };
 };
 
-/// Gain, zero and start that fit best at a time constant and latency, and what is left.
+/// Gain, zero and start that fit best for a time constant and latency, and the remaining misfit.
 struct LinearFit {
   ServoParams params = ServoParams::Zero();
-  double difference = 0.0;  ///< Of the gain, by the command's sign.
+  double difference = 0.0;  ///< Of the gain, by the sign of the command.
   double sum2 = std::numeric_limits<double>::infinity();
 };
 
-/// Every n-th row, so that a search over a long log stays short; commands between are piecewise constant.
+/// Every n-th row, to keep a search over a long log short; commands in between are piecewise constant.
 [[nodiscard]] std::vector<ServoSample> thinned(std::span<const ServoSample> log);
 
-/// The best of a grid in time constant (by factors) and latency (up to a third of the log). `by_sign`: with a gain that
-/// differs by the command's sign.
+/// The best of a grid in time constant (geometric) and latency (up to a third of the log). `by_sign`: with a gain that
+/// differs by the sign of the command.
 [[nodiscard]] LinearFit searched(std::span<const ServoSample> log, ServoKind kind, bool by_sign = false);
 
-/// (JᵀJ)⁻¹, by parameters scaled so that their units do not matter; none where it cannot be solved.
+/// (JᵀJ)⁻¹, with the parameters scaled to be independent of units; none if singular.
 [[nodiscard]] std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J);
 
-/// ln |A|, by columns scaled so that their units do not matter.
+/// ln |A|, with the columns scaled to be independent of units.
 [[nodiscard]] double log_determinant(const Eigen::MatrixXd& A);
 
-/// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
+/// Levenberg–Marquardt from there; time constant and latency stay within a meaningful range.
 [[nodiscard]] ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params);
 
 inline constexpr std::size_t num_of_a_resonance = 3;
 
-/// Of the gain, in parts of it: the response is nearly linear in them.
+/// Of the gain, relative: the response is nearly linear in them.
 [[nodiscard]] constexpr bool is_of_the_gain(std::size_t flaw) {
   return flaw == ServoFlaw::gain_difference || flaw == ServoFlaw::gain_drift || flaw == ServoFlaw::gain_by_size;
 }
 
-/// Whether a plant of this kind can have it by itself: of the other one it is another flaw, or nothing.
+/// Whether a plant of this kind can have it as a separate nonlinearity: for the other kind it is another one, or none.
 [[nodiscard]] constexpr bool is_of_kind(ServoKind kind, std::size_t flaw) {
   if (flaw == ServoFlaw::command_limit) return kind == ServoKind::angle;
   return flaw != ServoFlaw::rate_offset || kind == ServoKind::rate;
 }
 
-/// The log's, not the axis'.
+/// Of the log, not of the axis.
 [[nodiscard]] constexpr bool is_of_the_log(std::size_t flaw) {
   return flaw == ServoFlaw::clock_rate || flaw == ServoFlaw::earlier_command;
 }
 
-/// The largest command, whatever its sign.
+/// Largest absolute command.
 [[nodiscard]] double largest_command(std::span<const ServoSample> log);
 
-/// Angles that a servo of this fit, with its flaws, reads at the times of the log. In closed form, but for a second
-/// lag, which is stepped through.
+/// Angles that a servo with this fit and its nonlinearities reads at the times of the log. In closed form, except for a
+/// second lag, which is integrated in steps.
 [[nodiscard]] Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit& fit,
                                               const ServoFlaws& flaws);
 
-/// ∂ response / ∂ (parameters in their order, flaws that were freed), by differences.
+/// ∂ response / ∂ (parameters in order, freed nonlinearities), by differences.
 [[nodiscard]] Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit);
 
-/// The Jacobian where the response hardly depends, to the first order, on a time constant far below the rows' spacing,
-/// beside a resonance or a limit of acceleration, or on how two equal lags are split: with the column of the time
-/// constant a difference so wide that it shows.
+/// The Jacobian if, to first order, the response hardly depends on a time constant far below the rows' spacing,
+/// besides a resonance or an acceleration limit, or on how two equal lags are split: the column of the time
+/// constant is then a difference wide enough to be visible.
 [[nodiscard]] Eigen::MatrixXd with_open_lag(std::span<const ServoSample> log, const ServoFit& fit, Eigen::MatrixXd J);
 
-/// Includes in the covariance that such a time constant below the rows' spacing may as well be a latency.
+/// Includes in the covariance that such a time constant below the rows' spacing may equally be a latency.
 void count_short_lag(std::span<const ServoSample> log, ServoFit& fit);
 
-/// Whether the lag is of an acceleration or of what swings, so that the axis needs no other.
+/// Whether the lag belongs to an acceleration limit or a resonance, so that the axis needs no other.
 [[nodiscard]] bool is_lagged_otherwise(const ServoFit& fit);
 
-/// Whether it has a resonance whose share is within 3σ of none: how much of the latency is its delay 2ζ/ω is then open
-/// (`count_short_lag` counts all of it).
+/// Whether it has a resonance whose share is within 3σ of zero: how much of the latency is its delay 2ζ/ω is then
+/// undetermined (`count_short_lag` includes all of it).
 [[nodiscard]] bool is_hardly_excited(const ServoFit& fit);
 
 /// Response − readings.
 [[nodiscard]] Eigen::VectorXd flawed_misfit(std::span<const ServoSample> log, const ServoFit& fit);
 
-/// Levenberg–Marquardt over parameters and freed flaws. Returns the sum of squared residuals.
+/// Levenberg–Marquardt over parameters and freed nonlinearities. Returns the sum of squared residuals.
 double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& fit);
 
-/// From one to the next.
+/// Lag-one autocorrelation.
 [[nodiscard]] double lag_one_correlation(const Eigen::VectorXd& misfit);
 
-/// Rows that do not share errors: of an AR(1) noise with the residuals' correlation from row to row.
+/// Number of rows with independent errors: for AR(1) noise with the residuals' lag-one correlation.
 [[nodiscard]] double effective_rows(const Eigen::VectorXd& misfit);
 
-/// What a fit leaves, and the directions in which its parameters can follow.
+/// Residuals of a fit, and the directions in which its parameters can follow.
 struct FlawGround {
   Eigen::VectorXd response, misfit;  ///< misfit = response − readings.
-  Eigen::MatrixXd across;            ///< Orthonormal, of the Jacobian's columns.
+  Eigen::MatrixXd across;            ///< Orthonormal basis of the Jacobian's columns.
 };
 [[nodiscard]] FlawGround flaw_ground(std::span<const ServoSample> log, const ServoFit& fit);
 
-/// How much of Σ misfit² a flaw of a size explains, by one linearisation with the parameters following.
+/// Part of Σ misfit² that a nonlinearity of one size explains, by one linearisation with the parameters following.
 struct FlawScore {
   double size = 0.0, gain2 = 0.0;
 };
-/// Of a few sizes, the one that explains most first.
+/// Of a few sizes, the one that explains most comes first.
 [[nodiscard]] std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const ServoFit& fit,
                                                  const FlawGround& ground, std::size_t flaw);
 
-/// What a resonance of that damping and a share of one would add to a response: one column for each frequency of a grid
+/// Contribution of a resonance with that damping and a share of one to a response: one column per frequency of a grid
 /// up to what the readings resolve.
 struct AddedResonances {
   std::vector<double> hz;
@@ -134,43 +134,43 @@ struct AddedResonances {
 [[nodiscard]] AddedResonances added_resonances(std::span<const ServoSample> log, const Eigen::VectorXd& response,
                                                double damping);
 
-/// Beyond it a log is said to have a resonance: of a true model's largest score among the grid's frequencies less than
-/// one in a thousand is.
+/// Threshold above which a log indicates a resonance: for a correct model, the largest score over the grid exceeds it
+/// less than once in a thousand.
 inline constexpr double sigmas_of_a_resonance = 4.5;
 
-/// A resonance of some frequency and damping, its share by one linearisation with the parameters following.
+/// A resonance of given frequency and damping, its share by one linearisation with the parameters following.
 struct ResonanceScore {
   double hz = 0.0, damping = 0.0, share = 0.0;
-  double sigmas = 0.0;  ///< Its score, where neighbouring rows share errors as what it leaves does.
+  double sigmas = 0.0;  ///< Its score, with neighbouring rows correlated as the remaining residuals are.
 };
 
-/// The largest score of a grid of frequencies, up to what the readings resolve, and damping ratios. The score's
-/// variance is of errors as correlated as those that are left (Bartlett's window). W. K. Newey & K. D. West, "A simple,
+/// The largest score over a grid of frequencies, up to what the readings resolve, and damping ratios. The variance of
+/// the score is for errors correlated like the residuals (Bartlett's window). W. K. Newey & K. D. West, "A simple,
 /// positive semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix", 1987.
-/// `others`: what else may be there, each of whatever size, and no resonance then.
+/// `others`: other effects that may be present, each of any size, without a resonance.
 [[nodiscard]] ResonanceScore resonance_score(std::span<const ServoSample> log, const ServoFit& fit, FlawGround ground,
                                              std::span<const ServoFlaws> others = {});
 
-/// Whether it does, beside whatever else the residuals of the fit indicate and that is not in it.
+/// Whether there is one, besides whatever else the residuals of the fit indicate and the fit does not contain.
 [[nodiscard]] bool asks_for_resonance(std::span<const ServoSample> log, const ServoFit& fit);
 
 /// The fit with a resonance freed, from the best points of a grid in its frequency and damping, and in the time
-/// constant and latency, which without it have taken its delay. None: what fits best would not swing.
+/// constant and latency, which have absorbed its delay without it. None if the best fit does not oscillate.
 [[nodiscard]] std::optional<ServoFit> with_resonance(std::span<const ServoSample> log, const ServoFit& fit);
 
-/// Which flaws to try: all where the residuals of a linear fit indicate one of the axis, else those of the log alone.
-/// Never a resonance: that is tried when all else has been.
+/// Which nonlinearities to try: all if the residuals of a linear fit indicate one of the axis, else those of the log
+/// only. Never a resonance: it is tried after all others.
 [[nodiscard]] std::vector<std::size_t> indicated_flaws(std::span<const ServoSample> log, const ServoFit& fit);
 
-/// The fit with every one of these flaws that the log supports, one after the other: 2 ln of the likelihood ratio,
-/// counted in rows that do not share errors, above ln n + 12 (Schwarz's criterion, and a margin for the choice among
-/// flaws and sizes). Of an angle plant the limits of rate and acceleration are tried together as well, where one alone
-/// leaves structure. `rivals`: flaws that explain the same nearly as well. G. Schwarz, "Estimating the dimension of a
+/// The fit with every one of these nonlinearities that the log supports, one after another: 2 ln of the likelihood
+/// ratio, counted in rows with independent errors, above ln n + 12 (Schwarz's criterion, and a margin for the choice
+/// among kinds and sizes). For an angle plant the limits of rate and acceleration are also tried jointly, if one alone
+/// leaves structure. `rivals`: nonlinearities that explain nearly as much. G. Schwarz, "Estimating the dimension of a
 /// model", 1978.
 [[nodiscard]] ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& start,
                                   std::span<const std::size_t> flaws, std::vector<ServoRival>& rivals);
 
-/// Dead band, backlash and a limit of the rate, each of a typical size, that the log would not show: with it the rest
+/// Dead band, backlash and a rate limit, each of typical size, that the log would not show: with it the rest
 /// fits equally well.
 [[nodiscard]] std::vector<HiddenFlaw> hidden_flaws(std::span<const ServoSample> log, const ServoFit& fit);
 

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// The parameters after a step, time constant and latency within what has a meaning.
+/// The parameters after a step, with time constant and latency kept within a meaningful range.
 [[nodiscard]] inline ServoParams within_meaning(const ServoParams& from, ServoParams next) {
   constexpr double fastest_tau_s = 1e-5;
   next[ServoParam::tau] = std::max({next[ServoParam::tau], 0.2 * from[ServoParam::tau], fastest_tau_s});
@@ -19,10 +19,10 @@ namespace alidade {
 struct LevenbergConfig {
   int max_steps = 60;
   double first_damping = 1e-6;
-  double tolerance = 1e-12;  ///< Converged where a step lowers the squares by less than this share.
-  double ridge = 0.0;        ///< Added to the diagonal of the normal equations, as a share of its largest.
-  /// Where steps are used up it has converged, too, if the last ones together moved it by less than a hundredth of σ:
-  /// about a kink (a latency at which a command meets a row) steps get shorter without end.
+  double tolerance = 1e-12;  ///< Converged if a step reduces the squares by less than this fraction.
+  double ridge = 0.0;        ///< Added to the diagonal of the normal equations, relative to its largest element.
+  /// If the steps are used up, it has also converged if the last ones together moved it by less than a hundredth of σ:
+  /// near a kink (a latency at which a command meets a row) steps become ever shorter.
   static constexpr int last_steps = 10;
 };
 struct LevenbergOutcome {
@@ -30,8 +30,8 @@ struct LevenbergOutcome {
   bool has_converged = false;
 };
 
-/// Lowers |misfit(state)|² from `state` on by damped Gauss–Newton steps, state = after(state, step).
-/// `jacobian_at(state, misfit)`: one of differences takes them from the misfit that is known there.
+/// Minimises |misfit(state)|² from `state` by damped Gauss–Newton steps, state = after(state, step).
+/// `jacobian_at(state, misfit)`: finite differences start from the known misfit.
 /// K. Levenberg, "A method for the solution of certain non-linear problems in least squares", 1944, with the scaling of
 /// D. W. Marquardt, 1963.
 template <class State, class Misfit, class Jacobian, class After>

@@ -9,8 +9,8 @@
 
 namespace alidade {
 
-/// Indices of the fitted parameters: logarithms of rate, acceleration and time constant, then seconds and radians; by
-/// how much of itself the period of the encoder's sampling is longer than the one that was set.
+/// Indices of the fitted parameters: logarithms of rate, acceleration and time constant, then seconds and radians; last
+/// the relative difference of the encoder's sampling period from the preset one.
 struct PositionerPlace {
   enum : int { rate, acceleration, time_constant, latency, backlash, offset, sampling, count };
 };
@@ -18,36 +18,36 @@ using PositionerVector = Eigen::Vector<double, PositionerPlace::count>;
 
 [[nodiscard]] PositionerParams positioner_params(const PositionerVector& theta, double dead_band_rad);
 
-/// The readings of a log that are used, whitened.
+/// The used readings of a log, whitened.
 class PositionerProblem {
  public:
   PositionerProblem(const PositionerLog& log, double step_rad, double dead_band_rad);
 
   [[nodiscard]] std::size_t size() const { return readings_.size(); }
-  /// (model − reading) / σ, beyond the threshold as far as its logarithm.
+  /// (model − reading) / σ; beyond the threshold only its logarithm.
   [[nodiscard]] Eigen::VectorXd misfit(const PositionerVector& theta) const;
   [[nodiscard]] std::vector<double> model(const PositionerVector& theta) const;
   /// By central differences; columns of fixed parameters are zero.
   [[nodiscard]] Eigen::MatrixXd jacobian(const PositionerVector& theta, const std::vector<int>& free) const;
-  /// Minimises from `theta` over the free parameters; the sum of squares.
+  /// Minimises from `theta` over the free parameters; returns the sum of squares.
   double solve(PositionerVector& theta, const std::vector<int>& free, int max_steps = 60) const;
-  /// A start is searched for without a threshold: what is far off would count for nothing, and a wrong minimum hold.
+  /// Initial search without a threshold: otherwise outliers would have no weight, and a wrong minimum would persist.
   void set_threshold(double sigmas) { threshold_ = sigmas; }
 
-  /// Readings are of the encoder's samples.
+  /// Readings are samples held by the encoder.
   void set_sampling(const EncoderSampling& sampling, const PositionerVector& theta);
-  /// Searches the residuals for the encoder's sampling; none: it is read when it is asked.
+  /// Searches the residuals for the encoder's sampling; none: it is read on request.
   [[nodiscard]] std::optional<EncoderSampling> find_sampling(const PositionerVector& theta) const;
-  /// The sampling near this one, with which `theta` was fitted, that puts the fewest readings into another sample; the
-  /// latency of `theta` follows its phase.
+  /// The sampling near this one, used for `theta`, that assigns the fewest readings to a different sample; the
+  /// latency of `theta` is adjusted to its phase.
   [[nodiscard]] EncoderSampling refined(const EncoderSampling& sampling, PositionerVector& theta) const;
 
-  /// A sampling that was set, with the period that was fitted since.
+  /// The preset sampling with the period fitted since.
   [[nodiscard]] EncoderSampling fitted(const EncoderSampling& sampling, const PositionerVector& theta) const;
 
   [[nodiscard]] const std::vector<PositionerReading>& readings() const { return readings_; }
   [[nodiscard]] const std::vector<double>& rates() const { return rate_; }
-  /// Which command's doing a reading is: its cluster.
+  /// The command that a reading responds to: its cluster.
   [[nodiscard]] const std::vector<int>& move() const { return move_; }
 
  private:
@@ -63,8 +63,8 @@ class PositionerProblem {
   double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0, threshold_ = 4.0;
 };
 
-/// Of readings that are renewed at no regular times the model cannot know how old each is; when the first change is
-/// read is seen, of commands that came at any phase.
+/// If readings are renewed at irregular times, the model cannot know the age of each; the delay of the first visible
+/// change is observable, from commands at random phases.
 void heed_renewal(const PositionerLog& log, double step_rad, PositionerFit& fit);
 
 }  // namespace alidade

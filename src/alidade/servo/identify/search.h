@@ -7,20 +7,20 @@
 
 namespace alidade {
 
-/// Where to look for a target that was lost: about where its motion, dying away, has carried it, on an Archimedean
-/// spiral at constant speed whose turns overlap by less than an image. Allocates nothing.
+/// Search pattern for a lost target: around the position to which its decaying motion has carried it, on an Archimedean
+/// spiral at constant speed whose turns overlap by less than an image. Allocates no memory.
 class TargetSearch {
  public:
-  /// `view_height_rad` is the image's height as an angle.
+  /// `view_height_rad` is the angular height of the image.
   TargetSearch(const SearchConfig& config, double view_height_rad)
       : config_(config), turn_rad_(config.turn_of_view * view_height_rad) {}
 
-  /// The target was last believed there, at that time.
+  /// Last known position of the target, at that time.
   void begin(double t_s, const std::array<Bearing, 2>& lost) {
     begin_s_ = t_s;
     lost_ = lost;
   }
-  /// (pan, tilt) to look at.
+  /// (pan, tilt) to point at.
   [[nodiscard]] Eigen::Vector2d at(double t_s) const;
 
  private:

@@ -14,8 +14,8 @@ namespace alidade {
          exp_so3({0.0, 0.0, pan_tilt_roll_rad.z()});
 }
 
-/// The same of a head whose tilt axis is rotated by so much about the view, from where it would be perpendicular to the
-/// pan axis.
+/// The same for a head whose tilt axis is rotated by this angle about the optical axis, relative to perpendicular to
+/// the pan axis.
 [[nodiscard]] inline Eigen::Quaterniond base_from_cam_rotation(const Eigen::Vector3d& pan_tilt_roll_rad,
                                                                double axes_skew_rad) {
   const Eigen::Vector3d tilt_axis(std::cos(axes_skew_rad), std::sin(axes_skew_rad), 0.0);
@@ -23,8 +23,8 @@ namespace alidade {
          exp_so3({0.0, 0.0, pan_tilt_roll_rad.z()});
 }
 
-/// Angular rate in the camera frame of a head that rotates with these rates: without roll
-/// (τ̇, −α̇ cos τ, α̇ sin τ), so that ω_z is zero at zero tilt alone.
+/// Angular rate in the camera frame of a head that rotates at these rates: without roll
+/// (τ̇, −α̇ cos τ, α̇ sin τ), so that ω_z is zero only at zero tilt.
 [[nodiscard]] inline Eigen::Vector3d head_rate_in_cam(const Eigen::Vector3d& pan_tilt_roll_rad,
                                                       const Eigen::Vector3d& rate_rad_per_s) {
   const double tilt = pan_tilt_roll_rad.y(), pan_rate = rate_rad_per_s.x();

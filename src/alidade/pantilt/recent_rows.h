@@ -6,11 +6,11 @@
 
 #include "alidade/estimation/verdict.h"
 
-// For streams without end: only the newest rows are kept, so that memory is bounded.
+// For streams without end: only the newest rows are kept, to bound the memory.
 
 namespace alidade {
 
-/// Erases the oldest rows where there are twice `keep` of them, so that each row costs the same on average; how many.
+/// Erases the oldest rows once there are twice `keep` of them, so that the mean cost per row is constant. How many.
 template <typename Row>
 std::size_t forget_oldest(std::vector<Row>& rows, std::size_t keep) {
   if (rows.size() < 2 * keep) return 0;
@@ -19,7 +19,7 @@ std::size_t forget_oldest(std::vector<Row>& rows, std::size_t keep) {
   return count;
 }
 
-/// Says that a result is of the newest rows, where some were forgotten; `unit`: "rows", "observations".
+/// Adds to a result that it covers the newest rows only, if some were forgotten; `unit`: "rows", "observations".
 void add_recent_rows(std::size_t forgotten, std::size_t kept, const char* unit, Verdict& verdict);
 
 }  // namespace alidade

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Seeded random numbers that are the same with every standard library: the distributions of <random> are not.
+/// Seeded random numbers, identical with every standard library; the distributions of <random> are not.
 class Draws {
  public:
   explicit Draws(std::uint64_t seed) : bits_(seed) {}

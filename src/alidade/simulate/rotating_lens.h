@@ -15,7 +15,7 @@ namespace alidade {
   return {k.fx * bent.x() + k.cx, k.fy * bent.y() + k.cy};
 }
 
-/// The ray (x, y, 1) that is seen there: Newton's method on the radius.
+/// The ray (x, y, 1) of a pixel: Newton's method on the radius.
 [[nodiscard]] inline Eigen::Vector3d ray_of_px(const RotatingIntrinsics& k, const Eigen::Vector2d& px) {
   const Eigen::Vector2d bent((px.x() - k.cx) / k.fx, (px.y() - k.cy) / k.fy);
   if (k.k1 == 0.0 && k.k2 == 0.0 && k.k3 == 0.0 && k.p1 == 0.0 && k.p2 == 0.0) return {bent.x(), bent.y(), 1.0};

@@ -14,18 +14,18 @@
 
 namespace alidade {
 
-/// A head as it is: two axes that obey late and never quite as known, encoders that round and err, a camera with noise
-/// on the target's pixel.
+/// The truth of a head: two axes that respond late and differ from their model, encoders with rounding and errors, and
+/// a camera with noise on the target's pixel.
 struct HeadTruth {
   RigHead head;
   std::array<ServoAxis, 2> axes{};  ///< (pan, tilt)
-  double encoder_step_rad = 0.0;    ///< Of one count; 0: none.
+  double encoder_step_rad = 0.0;    ///< One count; 0: no rounding.
   double sigma_encoder_rad = 0.0008726646259971648;
   double sigma_px = 0.5;
   std::vector<Eigen::Vector3d> background_in_world = {};  ///< Distant static points.
 };
 
-/// It moves. Same seed, same noise. Allocates nothing once made.
+/// The moving head. Same seed, same noise. It allocates nothing after construction.
 class SimulatedHead {
  public:
   SimulatedHead(const HeadTruth& truth, const Eigen::Vector2d& pan_tilt_rad, std::uint64_t seed);
@@ -33,18 +33,18 @@ class SimulatedHead {
   void send(const Eigen::Vector2d& command);
   void advance(double dt_s);
   [[nodiscard]] Eigen::Vector2d read_encoders();
-  /// Where the target is in the image taken now: without noise, anywhere in front of the camera.
+  /// Pixel of the target in an image taken now: without noise, also outside the image if in front of the camera.
   [[nodiscard]] std::optional<Eigen::Vector2d> true_pixel(const Eigen::Vector3d& target_in_world) const;
-  /// The same dt ≥ 0 later, under the commands that were sent; the head itself stays.
+  /// The same a time dt ≥ 0 later, under the commands already sent; the head itself is not advanced.
   [[nodiscard]] std::optional<Eigen::Vector2d> true_pixel_after(double dt_s,
                                                                 const Eigen::Vector3d& target_in_world) const;
-  /// The same as `true_pixel` with noise, where it is within the image.
+  /// `true_pixel` with noise, if it lies within the image.
   [[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const Eigen::Vector3d& target_in_world);
-  /// Where the background is in that image, with noise; NaN: not in it.
+  /// Pixels of the background in that image, with noise; NaN: not in it.
   [[nodiscard]] std::vector<Eigen::Vector2d> seen_background();
-  /// From now on the focal lengths are so many times the camera's own.
+  /// Sets the focal lengths to this factor of the camera's own.
   void zoom_to(double factor);
-  /// Intrinsics as they are.
+  /// The present intrinsics.
   [[nodiscard]] const Eigen::Vector4d& intrinsics() const { return intrinsics_; }
   [[nodiscard]] Eigen::Vector2d angles_rad() const;
   [[nodiscard]] Eigen::Vector2d rates_rad_s() const;
@@ -59,22 +59,22 @@ class SimulatedHead {
   Eigen::Vector4d intrinsics_;
 };
 
-/// A log as `alidade identify` reads it: one axis under steps of several sizes to both sides, or a chirp.
+/// A log for `alidade identify`: one axis under steps of several sizes in both directions, or a chirp.
 struct ServoLogScene {
   ServoAxis axis;
-  Mode mode = {};  ///< What swings behind it.
+  Mode mode = {};  ///< A flexible mode behind the axis.
   bool is_chirp = false;
-  double amplitude = 200.0;  ///< Of the command.
+  double amplitude = 200.0;  ///< Amplitude of the command.
   double duration_s = 5.0, rate_hz = 100.0;
   int commands_per_row =
-      1;  ///< Commands change so often from row to row; a row has the one that is valid from then on.
-  double step_at_s = 0.5, hold_s = 0.9;                   ///< The first step, and each until the next.
-  std::vector<double> steps{1.0, -0.5, 0.25, -1.0, 0.5};  ///< Of the amplitude, over and over; one: it stays.
-  double low_hz = 0.1, high_hz = 3.0;                     ///< Of the chirp.
-  double max_command = 0.0;                               ///< Larger ones act as it; 0: none do.
-  double rate_offset_rad_s = 0.0;                         ///< It turns by so much beside what it is commanded.
-  double soft_max_rate_rad_s = 0.0;                       ///< Rates r are r / (1 + |r| / this); 0: as its lag has them.
-  double zero_rad = 0.0;                                  ///< What the encoder reads at angle zero.
+      1;  ///< Commands change so many times from row to row; a row has the command that is valid from then on.
+  double step_at_s = 0.5, hold_s = 0.9;                   ///< Time of the first step, and interval between steps.
+  std::vector<double> steps{1.0, -0.5, 0.25, -1.0, 0.5};  ///< In amplitudes, repeated; one: it is kept.
+  double low_hz = 0.1, high_hz = 3.0;                     ///< Frequencies of the chirp.
+  double max_command = 0.0;                               ///< Larger commands act like this one; 0: no limit.
+  double rate_offset_rad_s = 0.0;                         ///< Rotation rate in addition to the commanded one.
+  double soft_max_rate_rad_s = 0.0;                       ///< A rate r becomes r / (1 + |r| / this); 0: by the lag.
+  double zero_rad = 0.0;                                  ///< Reading of the encoder at angle zero.
   double sigma_rad = 0.0008726646259971648, encoder_step_rad = 0.0;
 };
 struct ServoLogRow {

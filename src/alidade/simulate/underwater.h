@@ -11,8 +11,8 @@
 
 namespace alidade {
 
-/// A world for `localize`: a camera under water that swings in front of a board. Its numbers are those of the
-/// experiment of Xu & Xu, "Underwater monocular localization with lens distortion", as far as it says them.
+/// A world for `localize`: a camera under water that swings in front of a board. Its values are those of the experiment
+/// of Xu & Xu, "Underwater monocular localization with lens distortion", as far as the paper states them.
 struct UnderwaterScene {
   Camera camera;       ///< See underwater_camera().
   int num_points = 8;  ///< The board's 8, then others around and behind it.
@@ -20,18 +20,18 @@ struct UnderwaterScene {
   int num_frames = 35;
   double dt_s = 0.1;
   double sigma_px = 0.5;
-  double sigma_known_m = 0.001;  ///< Of each coordinate of a known point.
-  double sigma_depth = 0.03;     ///< Of the initial depth of an unknown point, over the depth.
-  double sigma_position_m = 0.005, sigma_rotation_rad = 0.01;  ///< Of the initial state that a filter is given.
-  double mismatches = 0.0;    ///< Share of the observations after the first frame that show another point.
-  double mismatch_px = 60.0;  ///< How far at most, in each coordinate.
-  double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Nothing is seen from then on for so long.
+  double sigma_known_m = 0.001;  ///< σ of each coordinate of a known point.
+  double sigma_depth = 0.03;     ///< σ of the initial depth of an unknown point, over the depth.
+  double sigma_position_m = 0.005, sigma_rotation_rad = 0.01;  ///< σ of the initial state given to a filter.
+  double mismatches = 0.0;    ///< Share of the observations after the first frame that are of another point.
+  double mismatch_px = 60.0;  ///< Largest distance, in each coordinate.
+  double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Start and duration of an interval without observations.
   // What differs from the filter's assumptions.
-  double readout_s = 0.0;  ///< From an image's first row to its last; its time is that of the central one.
-  double late_s = 0.0;     ///< Images are taken so long before the time that they bear.
-  int missing_every = 0;   ///< Of so many frames the last is missing, and those behind it are timed as if none were.
-  double target_speed_m_s = 0.0;  ///< Of the board along its x, against the other points.
-  double target_stretch = 0.0;    ///< Known points are given so much (relative) further apart along x.
+  double readout_s = 0.0;         ///< From an image's first row to its last; its time is that of the central row.
+  double late_s = 0.0;            ///< Images are taken this long before their time stamps.
+  int missing_every = 0;          ///< The last of so many frames is missing, and later times have no gap there.
+  double target_speed_m_s = 0.0;  ///< Speed of the board along its x, relative to the other points.
+  double target_stretch = 0.0;    ///< Relative excess of the known points' distances along x, as given.
 };
 
 /// 768×576, fx 768, fy 766, cx 389, cy 284, k1 −0.44881, k2 0.0664, p1 0.01316, p2 0.00218: strong distortion, which
@@ -45,25 +45,25 @@ struct UnderwaterObservation {
 };
 
 struct UnderwaterFrame {
-  double t_s = 0.0;       ///< That it bears.
-  Rigid3 world_from_cam;  ///< The truth, when it was taken.
+  double t_s = 0.0;       ///< The time stamp.
+  Rigid3 world_from_cam;  ///< The true pose when it was taken.
   std::vector<UnderwaterObservation> observations;
 };
 
-/// What a filter is given of a point before it sees it, and the truth.
+/// What a filter is given of a point before its first observation, and the truth.
 struct UnderwaterPoint {
   long id = 0;
   bool is_known = false;
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
-  Eigen::Vector3d given_in_world = Eigen::Vector3d::Zero();  ///< Of a known one.
-  double given_depth_m = 0.0;  ///< Along the optical axis, where an unknown one is first seen.
+  Eigen::Vector3d given_in_world = Eigen::Vector3d::Zero();  ///< Given position of a known point.
+  double given_depth_m = 0.0;  ///< Depth along the optical axis at the first observation of an unknown point.
 };
 
 struct UnderwaterSequence {
   std::function<Rigid3(double t_s)> world_from_cam;  ///< The truth at any time.
   std::vector<UnderwaterFrame> frames;
   std::vector<UnderwaterPoint> points;
-  Rigid3 given_start;  ///< The first pose as a filter is given it.
+  Rigid3 given_start;  ///< The first pose as given to a filter.
 };
 
 /// Vertices of a 10×8 grid of 28 mm: 1 (0,0), 2 (9,0), 3 (9,7), 4 (0,7), 5 (5,4), 6 (2,2), 7 (7,2), 8 (7,5); the world
@@ -71,7 +71,7 @@ struct UnderwaterSequence {
 /// ± 8° about each axis, in sines of 2.6 to 4.5 s. Same seed, same sequence.
 [[nodiscard]] UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64_t seed);
 
-/// Which of the points 1 to 8 a corner of that grid is, corners counted row by row from 0.
+/// Which of the points 1 to 8 a corner of that grid is; corners are counted row by row from 0.
 [[nodiscard]] std::optional<long> underwater_point_at(int corner);
 
 }  // namespace alidade

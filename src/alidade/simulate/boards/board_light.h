@@ -21,8 +21,8 @@ struct PixelRect {
   [[nodiscard]] bool is_empty() const { return u_end <= u_min || v_end <= v_min; }
 };
 
-/// Sub-sample weights of one pixel and axis: Gaussian of σ = blur_px, then the pixel's own width. `reach` is the number
-/// of pixels before and after it that count.
+/// Sub-sample weights of one pixel along one axis: a Gaussian of σ = blur_px, then the pixel's own width. `reach` is
+/// the number of pixels before and after it that contribute.
 struct BlurKernel {
   int reach = 0;
   Eigen::VectorXf weights;  ///< (2 reach + 1) · oversampling
@@ -30,10 +30,10 @@ struct BlurKernel {
   BlurKernel(double blur_px, int oversampling);
 };
 
-/// Smooth background of a few waves, in shares of the way from black to white.
+/// Smooth background of a few waves, as fractions of the range from black to white.
 class WavyBackground {
  public:
-  /// Of pixels −margin … width + margin − 1, and rows alike.
+  /// Covers pixels −margin … width + margin − 1, and rows likewise.
   WavyBackground(int width, int height, int margin, double texture, std::uint64_t seed);
   [[nodiscard]] double operator()(int u, int v) const {
     return 0.45 + across_.col(u + margin_).dot(down_.col(v + margin_));
@@ -49,21 +49,21 @@ class WavyBackground {
 struct LocalPlace;
 
 /// The light of photo `i` of a scene, by casting rays through the lens on the (curved) board: the print's light,
-/// blurred by the optics, integrated over each pixel. Light is linear: what a lamp adds is computed alone and added.
+/// blurred by the optics, integrated over each pixel. Light is linear: that of a lamp is computed separately and added.
 class BoardLight {
  public:
-  /// `seed` draws the background.
+  /// `seed` determines the background.
   BoardLight(const BoardScene& scene, std::size_t i, const RenderConfig& config, std::uint64_t seed);
 
   /// The whole image in ambient light.
   [[nodiscard]] PixelLight ambient() const;
 
-  /// What a lamp adds in the pixels of `rect`. `on_paper`: grey value that it gives white paper at a point in frame
-  /// board. Ink returns `ink_albedo` of what paper returns; what lies beside the board returns nothing.
+  /// Light added by a lamp in the pixels of `rect`. `on_paper`: the grey value that it gives white paper at a point in
+  /// frame board. Ink returns `ink_albedo` of what paper returns; everything beside the board returns nothing.
   [[nodiscard]] PixelLight added(const PixelRect& rect, double ink_albedo,
                                  const std::function<double(const Eigen::Vector3d& point_in_board)>& on_paper) const;
 
-  /// Pixels before and after a point of light that its blur reaches.
+  /// Number of pixels before and after a point of light that its blur reaches.
   [[nodiscard]] int blur_reach() const { return kernel_.reach; }
 
  private:

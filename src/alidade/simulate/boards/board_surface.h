@@ -9,9 +9,9 @@
 
 namespace alidade {
 
-/// The surface of a curved board: nominal position (s, t) → point in frame `board` [m]. Passes through every true point
-/// of the board; between them and around them the displacement from the plane is a smooth cubic (Hermite) of both
-/// coordinates, and a parabola where the points lie on one.
+/// The surface of a curved board: nominal position (s, t) → point in frame `board` [m]. It contains every true point of
+/// the board; between and around them the displacement from the plane is a smooth cubic (Hermite) in both coordinates,
+/// and a parabola if the points lie on one.
 class BoardSurface {
  public:
   /// `true_points` in the board's order.
@@ -20,17 +20,17 @@ class BoardSurface {
   [[nodiscard]] bool is_flat() const { return is_flat_; }
   [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector2d& place) const { return patch(place).point; }
 
-  /// Point where a ray meets the surface in front of its origin, from the initial guess `start`. None if it misses.
+  /// Intersection of a ray with the surface in front of its origin, from the initial guess `start`. None if it misses.
   [[nodiscard]] std::optional<Eigen::Vector2d> intersect(const Eigen::Vector3d& origin_in_board,
                                                          const Eigen::Vector3d& ray_in_board,
                                                          const Eigen::Vector2d& start) const;
 
  private:
   struct Patch {
-    Eigen::Vector3d point, along_s, along_t;  ///< With derivatives.
+    Eigen::Vector3d point, along_s, along_t;  ///< Point and its derivatives.
   };
   [[nodiscard]] Patch patch(const Eigen::Vector2d& place) const;
-  /// A staggered grid has no point at every other node: there the parabola of the three nearest in its row.
+  /// A staggered grid lacks every other node: it takes the parabola through the three nearest in its row.
   void fill_gaps(const std::vector<bool>& known);
   [[nodiscard]] const Eigen::Vector3d& node(std::size_t col, std::size_t row) const {
     return nodes_[row * s_.size() + col];

@@ -8,27 +8,27 @@
 
 namespace alidade {
 
-/// What is printed on a board: the ink at any point and where its edges are. Positions are nominal coordinates in frame
-/// `board` [m], as those of points_in_board(). Around the pattern there is a margin of paper.
+/// The print of a board: the ink at any point and the positions of its edges. Positions are nominal coordinates in
+/// frame `board` [m], as those of points_in_board(). The pattern has a margin of paper around it.
 class PrintedPattern {
  public:
-  /// Needs a board without fault().
+  /// Requires a board without fault().
   explicit PrintedPattern(const Board& board);
 
-  /// Ink at a point: 1 black, 0 paper, `outside` off the paper. Near an edge the two sides are mixed over a ramp of the
-  /// full widths given [m].
+  /// Ink at a point: 1 black, 0 paper, `outside` off the paper. Near an edge the two sides are mixed over a ramp with
+  /// the given full widths [m].
   [[nodiscard]] double ink(const Eigen::Vector2d& place, const Eigen::Vector2d& ramp, double outside) const;
 
-  /// The ink at a point without an edge within ±`reach` [m] of it, axis by axis. None where an edge may be so near.
+  /// The ink at a point if no edge is within ±`reach` [m] of it, axis by axis. None if there may be one.
   [[nodiscard]] std::optional<double> even_ink(const Eigen::Vector2d& place, const Eigen::Vector2d& reach,
                                                double outside) const;
 
-  /// Opposite corners of the printed area (paper without its margin).
+  /// Opposite corners of the printed area (the paper without its margin).
   [[nodiscard]] Eigen::Vector2d print_min() const { return print_min_; }
   [[nodiscard]] Eigen::Vector2d print_max() const { return print_max_; }
 
  private:
-  /// Ascending positions where the ink may change along one axis; cell i lies between edges i−1 and i.
+  /// Positions where the ink may change along one axis, ascending; cell i lies between edges i−1 and i.
   struct Axis {
     std::vector<double> edges;
     std::vector<std::size_t> first_edge;  ///< Per bin: the first edge beyond the bin's start.
@@ -39,7 +39,7 @@ class PrintedPattern {
     [[nodiscard]] std::size_t cell(double at) const;
     [[nodiscard]] double centre(std::size_t cell) const { return 0.5 * (edges[cell - 1] + edges[cell]); }
   };
-  /// A cell, and how much of its nearest neighbour is mixed in.
+  /// A cell, and the weight of its nearest neighbour.
   struct Mix {
     std::size_t near, far;
     double far_weight, distance;
@@ -56,7 +56,7 @@ class PrintedPattern {
   Axis x_, y_;
   std::vector<signed char> ink_;  ///< Row-major cells: 1 black, 0 paper, −1 off the paper.
   Board board_;
-  double disc_radius_m_ = 0.0;  ///< 0 where no discs are printed.
+  double disc_radius_m_ = 0.0;  ///< 0 if no discs are printed.
   Eigen::Vector2d print_min_, print_max_;
 };
 

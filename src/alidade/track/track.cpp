@@ -19,14 +19,14 @@ namespace {
 
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
 
-/// Several steps may belong to one instant: the last one has the most information.
+/// Several steps may have the same time: the last one has the most information, and replaces them.
 void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<PredictedStep>& smoothed) {
   if (!now) return;
   while (!smoothed.empty() && smoothed.back().t_s >= now->t_s) smoothed.pop_back();
   smoothed.push_back({now->t_s, true, now->belief});
 }
 
-/// Of a row that is not followed: where the target is expected at its time, by the others.
+/// The step of a row that is not followed: the predicted target at its time, from the other rows.
 TrackStep kept_out_step(const Tracker& tracker, const TargetObservation& observation, const TrackReport& report) {
   TrackStep step;
   const auto expected = tracker.at(observation.t_capture_s);
@@ -43,16 +43,16 @@ TrackStep kept_out_step(const Tracker& tracker, const TargetObservation& observa
   return step;
 }
 
-/// What of the following is asked for besides the steps.
+/// Optional outputs of following beyond the steps.
 struct AlsoAsked {
   double predict_s = 0.0, smooth_s = 0.0;
-  std::vector<bool> kept_out;  ///< As of a FollowConfig.
+  std::vector<bool> kept_out;  ///< As in FollowConfig.
   TrackWatch watch;
 };
 
 TrackReport followed(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                      const TrackerConfig& config, const Progress& progress, const AlsoAsked& also = {}) {
-  TrackerConfig no_longer = config;  // a history than there are observations
+  TrackerConfig no_longer = config;  // no more history than there are observations
   no_longer.max_kept = std::min(config.max_kept, observations.size() + 1);
   Tracker tracker({heads.begin(), heads.end()}, no_longer);
   TrackReport report;
@@ -91,16 +91,16 @@ double ln_p(const TrackReport& report, double gate) {
   return report.log_likelihood - gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
 }
 
-/// A few minutes: enough to decide.
+/// The first few minutes: enough to decide.
 std::span<const TargetObservation> first_of(std::span<const TargetObservation> observations) {
   constexpr std::size_t max_observations = 4000;
   return observations.first(std::min(observations.size(), max_observations));
 }
 
-/// The σ_a whose innovations are the most probable, from 0.03 to 30 m/s² in steps of a quarter of a decade.
+/// The σ_a that maximises the likelihood of the innovations, from 0.03 to 30 m/s² in steps of a quarter of a decade.
 Probable most_probable_sigma_a(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                TrackerConfig config, const Progress& progress) {
-  config.learn_errors = config.errors.num() > 0;  // the others' innovations follow one another
+  config.learn_errors = config.errors.num() > 0;  // otherwise the innovations are correlated
   Probable best{.sigma = config.sigma_a_m_s2};
   for (int quarter = -6; quarter <= 6; ++quarter) {
     config.sigma_a_m_s2 = std::pow(10.0, 0.25 * quarter);
@@ -115,7 +115,7 @@ double max_probable_sigma_a(std::span<const TargetObservation> observations, std
   return most_probable_sigma_a(observations, heads, config, progress).sigma;
 }
 
-/// The observations that count in statistics: there is a belief, and the track is older than the warm-up.
+/// The observations that count in statistics: with a belief, and after the warm-up of the track.
 std::vector<bool> counted(const std::vector<TrackStep>& steps, double warm_up_s) {
   std::vector<bool> result;
   double began_s = std::numeric_limits<double>::infinity();
@@ -136,7 +136,7 @@ void add_errors(TrackReport& report, const std::vector<bool>& counts, const True
     if (!step.has_belief || !position) continue;
     const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
     report.nees[i] = position_nees(step, truth);
-    // Of several heads at one instant the last one's observation completes the estimate.
+    // If several heads observe at one instant, the last observation completes the estimate.
     const bool is_complete = i + 1 == report.steps.size() || report.steps[i + 1].t_s != step.t_s;
     if (!counts[i] || !is_complete) continue;
     sum2 += error.squaredNorm();
@@ -152,7 +152,7 @@ void add_errors(TrackReport& report, const std::vector<bool>& counts, const True
   if (!bound.empty()) report.pcrlb_m = std::sqrt(sum_bound / num);
 }
 
-/// Over the same time as the errors of the steps.
+/// Over the same time span as the errors of the steps.
 void add_smoothed_error(TrackReport& report, const std::vector<bool>& counts, const TrueTrack& truth) {
   const auto first = std::ranges::find(counts, true);
   if (first == counts.end()) return;
@@ -187,14 +187,14 @@ std::vector<TargetObservation> without_kept_out(std::span<const TargetObservatio
   return others;
 }
 
-/// In order of capture: what is probable does not depend on what arrived first.
+/// The observations in order of capture: the likelihood must not depend on the order of arrival.
 std::vector<TargetObservation> as_captured(std::span<const TargetObservation> observations) {
   std::vector<TargetObservation> sorted(observations.begin(), observations.end());
   std::ranges::stable_sort(sorted, {}, [](const TargetObservation& s) { return std::pair(s.t_capture_s, s.head); });
   return sorted;
 }
 
-/// With the config's σ_px: its σ_a, found or given, and ln p with it.
+/// For the config's σ_px: its σ_a, estimated or given, and ln p with it.
 Probable probable_sigma_a(std::span<const TargetObservation> sorted, std::span<const RigHead> heads,
                           const FollowConfig& config) {
   if (config.find_sigma_a) return most_probable_sigma_a(sorted, heads, config.tracker, config.progress);
@@ -203,11 +203,11 @@ Probable probable_sigma_a(std::span<const TargetObservation> sorted, std::span<c
   return {learning.sigma_a_m_s2, ln_p(followed(first_of(sorted), heads, learning, config.progress), learning.gate)};
 }
 
-/// Of σ_px that the white part of the noise allows, the one whose innovations are the most probable. None where that
-/// part is as large as the config's σ_px says, or larger than that of a target which is found.
+/// Of the σ_px that the white part of the noise allows, the one that maximises the likelihood of the
+/// innovations. None if that part agrees with the config's σ_px, or is too large for a target detector.
 std::optional<double> sigma_px_by_white(std::span<const TargetObservation> sorted, std::span<const RigHead> heads,
                                         const FollowConfig& config, double compared_px, double& log_likelihood) {
-  constexpr double min_px = 0.2, max_px = 3.0;            // what finders of targets reach
+  constexpr double min_px = 0.2, max_px = 3.0;            // accuracy of target detectors
   constexpr double min_off = 3.0, min_off_smaller = 2.0;  // no fault of the rig makes noise look smaller
   constexpr int num_parts = 4;
   const auto first = first_of(sorted);
@@ -215,7 +215,7 @@ std::optional<double> sigma_px_by_white(std::span<const TargetObservation> sorte
   const auto white = white_noise(first, heads, steps, compared_px, config.tracker.sigma_encoder_rad);
   if (!white || white->sigma_px > max_px) return std::nullopt;
   if (!(white->off_in_sigma > min_off || white->off_in_sigma < -min_off_smaller)) return std::nullopt;
-  // What is not white is in no difference: where they are small, there may be more.
+  // Coloured noise does not show in the differences: where they are small, there may be more of it.
   const double low_px = white->off_in_sigma < 0.0 ? white->sigma_px : white->low_px;
   std::optional<double> best;
   FollowConfig as_that = config;
@@ -230,8 +230,8 @@ std::optional<double> sigma_px_by_white(std::span<const TargetObservation> sorte
   return best;
 }
 
-/// σ_px and σ_a where they are not given. The usual σ_px stays unless the white part of the noise says otherwise, and
-/// the innovations are then more probable: a rig that is wrong would ask for a larger one as well.
+/// Estimates σ_px and σ_a if they are not given. The default σ_px stays unless the white part of the noise differs from
+/// it and the innovations are then more likely: a wrong rig would ask for a larger one as well.
 void find_sigmas(std::span<const TargetObservation> sorted, std::span<const RigHead> heads, FollowConfig& config) {
   constexpr double min_gain = 5.0;
   const Probable usual = probable_sigma_a(sorted, heads, config);
@@ -239,7 +239,7 @@ void find_sigmas(std::span<const TargetObservation> sorted, std::span<const RigH
   config.tracker.sigma_a_m_s2 = usual.sigma;
   if (!config.find_sigma_px) return;
   FollowConfig found = config;
-  for (int again = 0; again < 2; ++again) {  // with the σ of the first, observations count that were rejected
+  for (int again = 0; again < 2; ++again) {  // with the first σ, rejected observations may become accepted
     double log_likelihood = 0.0;
     const auto sigma_px = sigma_px_by_white(sorted, heads, found, usual_px, log_likelihood);
     if (!sigma_px || !(log_likelihood > usual.log_likelihood + min_gain)) return;
@@ -249,7 +249,7 @@ void find_sigmas(std::span<const TargetObservation> sorted, std::span<const RigH
   config.tracker = found.tracker;
 }
 
-/// NIS of the counted steps, per degree of freedom.
+/// Mean NIS per degree of freedom over the counted steps.
 double mean_nis(const std::vector<TrackStep>& steps, const std::vector<bool>& counts, double gate) {
   double sum = 0.0, num = 0.0;
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -260,7 +260,7 @@ double mean_nis(const std::vector<TrackStep>& steps, const std::vector<bool>& co
   return num > 0.0 ? sum / (2.0 * num) : not_there;
 }
 
-/// What the innovations ask σ² to be raised by: where they are larger than stated, or follow one another.
+/// Factor by which the innovations require σ² to be inflated: if they are larger than stated, or autocorrelated.
 double asked_inflation(const TrackReport& report) {
   constexpr double min_nis = 0.2, in_sigma = 3.5, max_correlation = 0.35;
   double correlated = 0.0, num = 0.0;
@@ -268,7 +268,7 @@ double asked_inflation(const TrackReport& report) {
     correlated += static_cast<double>(head.num) * head.autocorrelation;
     num += static_cast<double>(head.num);
   }
-  // Of n observations the mean NIS a degree of freedom scatters by 1/√n.
+  // With n observations, the mean NIS per degree of freedom has a σ of 1/√n.
   const double max_nis = 1.0 + std::max(min_nis, in_sigma / std::sqrt(std::max(1.0, num)));
   double inflation = report.nis_per_dof > max_nis ? report.nis_per_dof : 1.0;
   if (num > 0.0 && correlated / num > max_correlation) inflation *= (num + correlated) / (num - correlated);
@@ -283,8 +283,8 @@ void inflate(TrackReport& report) {
   for (PredictedStep& step : report.smoothed) step.belief.P *= report.inflation;
 }
 
-/// Their path is one of the model cv: by a σ_a of another model that is too small for it, it seems to contradict the
-/// rig.
+/// The path of the tests is from the model cv: with the σ_a of another model, which may be too small for it, the rig
+/// would seem contradicted.
 RigTests rig_tests(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                    const FollowConfig& config, const TrackReport& report) {
   RigTests tests = rig_faults(observations, heads, config.tracker);
@@ -296,8 +296,8 @@ RigTests rig_tests(std::span<const TargetObservation> observations, std::span<co
   return cv.sigma_a_m_s2 > config.tracker.sigma_a_m_s2 ? rig_faults(observations, heads, cv) : tests;
 }
 
-/// What observations say of noise, motion and rig. Where the rig's errors are considered, by innovations of a filter
-/// that learns them.
+/// Tests noise, motion and rig. If the errors of the rig are considered, uses the innovations of a filter that
+/// estimates them.
 void judge_observations(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                         const FollowConfig& config, TrackReport& report) {
   report.errors_are_counted = config.tracker.errors.num() > 0;

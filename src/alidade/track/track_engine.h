@@ -10,8 +10,8 @@
 
 namespace alidade::detail {
 
-/// The tracker for one kind of filter: the last moments of observations and of beliefs after them, in order of capture,
-/// so that a late observation is inserted at its time and what follows is recomputed.
+/// The tracker for one kind of filter: keeps the last observations and the beliefs after them, in order of capture, so
+/// that a late observation is inserted at its time and everything after it is recomputed.
 template <class Filter>
 class TrackEngine {
  public:
@@ -38,7 +38,7 @@ class TrackEngine {
     for (std::size_t i = place + 1; i < count_; ++i) {
       TrackStep again;
       apply(i, again);
-      // An observation that came earlier and was taken later may have waited for this one.
+      // An observation that arrived earlier but was captured later may have waited for this one.
       if (!had_started && again.event == TrackEvent::start) {
         step.event = TrackEvent::start;
         step.accepted = true;
@@ -88,12 +88,12 @@ class TrackEngine {
     TargetObservation observation;
     Filter filter;
     bool has_started = false;
-    bool began = false;     ///< The track starts, or starts again, here.
-    bool accepted = false;  ///< The track took this observation.
-    /// Of each head, one after the other: counted together, a head that keeps failing would be hidden by one that does
-    /// not. Heads beyond the eighth share the last slot.
+    bool began = false;     ///< The track starts, or restarts, here.
+    bool accepted = false;  ///< The observation was used for the update.
+    /// Consecutive rejections per head: counted together, a head that keeps failing would
+    /// be hidden by one that does not. Heads beyond the eighth share the last slot.
     std::array<int, 8> num_rejected{};
-    std::size_t head = 0;  ///< That saw the target last, when, and when another did.
+    std::size_t head = 0;  ///< The head that observed last, its time, and the time of another head's last observation.
     double t_head_s = 0.0, t_other_s = 0.0;
   };
 
@@ -101,7 +101,7 @@ class TrackEngine {
   [[nodiscard]] const Entry& entry(std::size_t i) const { return kept_[(first_ + i) % kept_.size()]; }
   [[nodiscard]] const Entry& newest() const { return entry(count_ - 1); }
 
-  /// Forgets what nothing can be put before any more. Returns how many.
+  /// Drops entries before which nothing can be inserted any more. Returns their number.
   std::size_t make_room(std::size_t place) {
     std::size_t dropped = 0;
     const double oldest_s = newest_time() - config_.history_s;
@@ -113,7 +113,7 @@ class TrackEngine {
       ++dropped;
       has_forgotten_ = true;
     }
-    if (count_ == kept_.size()) --count_;  // the observation is older than all that is kept: the newest makes room
+    if (count_ == kept_.size()) --count_;  // the observation is older than all entries: the newest makes room
     return dropped;
   }
   [[nodiscard]] double newest_time() const { return count_ > 0 ? newest().observation.t_capture_s : -1e300; }
@@ -149,8 +149,8 @@ class TrackEngine {
     count_range_drift(newest(), step.t_s, step.belief);
   }
 
-  /// Nothing corrects the range while one head alone sees the target: an acceleration that lasts moves it along that
-  /// head's rays, more than the white one of the models does.
+  /// With a single head, nothing corrects the range: a lasting acceleration moves
+  /// the target along that head's rays more than the white one of the model does.
   void count_range_drift(const Entry& last, double t_s, Belief<6>& belief) const {
     if (config_.method != TargetMotion::cv && config_.method != TargetMotion::turn) return;
     if (!(last.t_head_s - last.t_other_s > one_head_after_s)) return;
@@ -164,7 +164,7 @@ class TrackEngine {
     belief.P += (1.0 - counted_before) * drift * drift.transpose();
   }
 
-  /// The outcome of the observation at this index, given the entry before it.
+  /// Processes the observation at this index, given the entry before it.
   void apply(std::size_t place, TrackStep& step) {
     Entry& now = entry(place);
     now.began = now.accepted = false;
@@ -201,8 +201,8 @@ class TrackEngine {
     now.accepted = step.accepted;
   }
 
-  /// Begins the track again where another one explains what was seen since a head's observations were first rejected:
-  /// it takes three observations more than the old one did, so that single false observations do not end a track.
+  /// Restarts the track if a new one explains the observations since the first rejection of a head: it
+  /// must accept three more than the old one did, so that single false observations do not end a track.
   bool begin_again(std::size_t place) {
     constexpr int more = 3;
     const std::size_t head = entry(place).observation.head;
@@ -237,7 +237,7 @@ class TrackEngine {
     return false;
   }
 
-  /// The last observation of another head that was taken at about the same time as this one.
+  /// The last observation of another head at about the same time as this one.
   [[nodiscard]] std::optional<std::size_t> other_before(std::size_t place) const {
     const TargetObservation& now = entry(place).observation;
     for (std::size_t i = place; i-- > 0 && now.t_capture_s - entry(i).observation.t_capture_s <= config_.together_s;)
@@ -263,7 +263,7 @@ class TrackEngine {
     now.t_head_s = now.observation.t_capture_s;
   }
 
-  /// Updates with the observation, where the gates let it: then `none`.
+  /// Updates with the observation if it passes the gates, and then returns `none`.
   TrackEvent use(Entry& now, TrackStep& step) const {
     const ObservationModel see(heads_[now.observation.head], now.observation.pan_tilt_rad,
                                sigma_px_of(now.observation, config_.sigma_px), sigma_encoder(now.observation.head),
@@ -294,8 +294,8 @@ class TrackEngine {
     return TrackEvent::none;
   }
 
-  /// Starts the track at this index from its observation and the last one of another head, if they are of about one
-  /// time and their rays meet in the working range.
+  /// Starts the track at this index from its observation and the last one of another
+  /// head, if they are nearly simultaneous and their rays meet in the working range.
   bool begin(std::size_t place) {
     const auto other = other_before(place);
     if (!other) return false;
@@ -329,12 +329,12 @@ class TrackEngine {
   }
 
   static constexpr double one_head_after_s = 0.5;
-  static constexpr std::size_t max_of_a_streak = 16;  ///< Observations that a new track may be begun from.
+  static constexpr std::size_t max_of_a_streak = 16;  ///< Observations from which a new track may start.
 
   std::vector<RigHead> heads_;
   TrackerConfig config_;
   Models models_;
-  std::vector<Entry> kept_;  ///< A ring: `count_` entries from `first_` on, in order of capture.
+  std::vector<Entry> kept_;  ///< A ring buffer: `count_` entries from `first_` on, in order of capture.
   std::size_t first_ = 0, count_ = 0;
   bool has_forgotten_ = false;
 };

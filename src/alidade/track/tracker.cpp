@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// Engines of a target that moves by one model: heads exact, their errors considered, their errors estimated.
+/// Engines for a single motion model: errors of the heads zero, considered, or estimated.
 template <class Model>
 using Exact = detail::TrackEngine<ModelFilter<Model>>;
 template <class Model>

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t num_of_window = 4;
 
-/// A third difference across the motion, of weights whose squares sum to one.
+/// A third difference across the motion; the squares of its weights sum to one.
 struct Difference {
   double size_px = 0.0;
   double variance_of_encoders_px2 = 0.0;
@@ -38,7 +38,7 @@ std::optional<Ray> ray_of(const RigHead& head, const TargetObservation& observat
   return Ray{observation.t_capture_s, rad_per_px, direction};
 }
 
-/// The observations of a head that count, in their order.
+/// The accepted observations of a head, in their order.
 std::vector<Ray> rays_of(std::span<const TargetObservation> observations, const RigHead& head, std::size_t index,
                          std::span<const TrackStep> steps) {
   std::vector<Ray> rays;
@@ -59,7 +59,7 @@ Difference difference_of(Window rays, double sigma_encoder_rad) {
   for (const Ray& ray : rays) middle_s += ray.t_s / num_of_window;
   for (std::size_t i = 0; i < num_of_window; ++i) {
     third += weights[i] * rays[i].direction;
-    motion += (rays[i].t_s - middle_s) * rays[i].direction;  // the slope, which no noise shares with `third`
+    motion += (rays[i].t_s - middle_s) * rays[i].direction;  // the slope; its noise is independent of that of `third`
     middle += rays[i].direction;
     rad_per_px += rays[i].rad_per_px / num_of_window;
   }
@@ -69,7 +69,7 @@ Difference difference_of(Window rays, double sigma_encoder_rad) {
 }
 
 void add_differences(const std::vector<Ray>& rays, double sigma_encoder_rad, std::vector<Difference>& differences) {
-  constexpr double longest = 1.6, shortest = 0.3;  // of the usual spacing; longer, and the path's bends count
+  constexpr double longest = 1.6, shortest = 0.3;  // of the usual interval; beyond, curvature of the path matters
   std::vector<double> apart_s;
   for (std::size_t i = 1; i < rays.size(); ++i) apart_s.push_back(rays[i].t_s - rays[i - 1].t_s);
   const double usual_s = median_of(apart_s);
@@ -82,7 +82,7 @@ void add_differences(const std::vector<Ray>& rays, double sigma_encoder_rad, std
   }
 }
 
-/// σ of the differences over the one expected of such pixels.
+/// σ of the differences over the expected one for pixels with `sigma_px`.
 double ratio_at(const std::vector<Difference>& differences, double sigma_px) {
   std::vector<double> scaled;
   for (const Difference& one : differences)
@@ -90,7 +90,7 @@ double ratio_at(const std::vector<Difference>& differences, double sigma_px) {
   return normal_from_mad * median_of(std::move(scaled));
 }
 
-/// σ of a pixel at which the differences are so many times as large as expected; 0 where the encoders explain them.
+/// σ of a pixel for which the differences are `ratio` times the expected ones; 0 if the encoders explain them.
 double sigma_at(const std::vector<Difference>& differences, double ratio) {
   constexpr int num_halvings = 30;
   double low_px = 0.0, high_px = 100.0;
@@ -112,7 +112,7 @@ std::optional<WhiteNoise> white_noise(std::span<const TargetObservation> observa
     add_differences(rays_of(observations, heads[h], h, steps), own > 0.0 ? own : sigma_encoder_rad, differences);
   }
   if (differences.size() < min_differences) return std::nullopt;
-  // σ by the median size of n independent ones scatters by 1.17/√n of it; these overlap: 1.2 to 1.6, by simulation.
+  // σ from the median of n independent values has a relative σ of 1.17/√n; these overlap: 1.2 to 1.6, by simulation.
   const double relative = 1.6 / std::sqrt(static_cast<double>(differences.size()));
   return WhiteNoise{.sigma_px = sigma_at(differences, 1.0),
                     .low_px = sigma_at(differences, 1.0 + relative),

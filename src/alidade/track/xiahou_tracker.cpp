@@ -6,7 +6,7 @@
 namespace alidade {
 namespace {
 
-/// The angles (pan, tilt) that an unrotated head without offsets would have to look along an observation.
+/// The angles (pan, tilt) at which a head without rotation and offsets would look along the ray of an observation.
 std::optional<Eigen::Vector2d> angles_of_ray(const RigHead& head, const TargetObservation& observation) {
   const auto ray = ray_in_world(head, observation);
   if (!ray) return std::nullopt;
@@ -24,7 +24,7 @@ XiahouTracker::XiahouTracker(std::span<const RigHead> heads, const XiahouConfig&
 
 TrackStep XiahouTracker::step_now() const {
   constexpr double m_per_cm = 0.01;
-  constexpr std::array<int, 6> place{0, 2, 4, 1, 3, 5};  // of x, y, z, vx, vy, vz in the paper's state
+  constexpr std::array<int, 6> place{0, 2, 4, 1, 3, 5};  // indices of x, y, z, vx, vy, vz in the paper's state
   TrackStep step;
   step.t_s = filter_time_s_;
   step.has_belief = step.accepted = true;

@@ -6,14 +6,14 @@
 
 #include "alidade/track/checks/track_assumed.h"
 
-// Angles that were not read when the images were taken.
+// Delay between angles and images: angles that were not read when the images were taken.
 
 namespace alidade {
 namespace {
 
 constexpr std::array<const char*, 3> coordinate_names{"x_m", "y_m", "z_m"};
 
-/// What each head's encoders read, in order of time.
+/// The readings of each head's encoders in temporal order.
 class ReadingLog {
  public:
   ReadingLog(std::span<const TargetObservation> observations, std::size_t num_heads) : of_head_(num_heads) {
@@ -22,7 +22,7 @@ class ReadingLog {
     for (auto& readings : of_head_) std::ranges::stable_sort(readings, {}, &Reading::t_s);
   }
 
-  /// Of each head what it read nearest to that time, if it did within a second.
+  /// For each head, the reading nearest to that time, if there is one within a second.
   [[nodiscard]] std::vector<HeadReading> at(double t_s) const {
     std::vector<HeadReading> nearest;
     for (std::size_t h = 0; h < of_head_.size(); ++h) {
@@ -35,8 +35,8 @@ class ReadingLog {
     return nearest;
   }
 
-  /// How fast a head's readings change about that time [rad/s], from the readings beside it; from the last two where
-  /// it is the last.
+  /// Rate at which a head's readings change at that time [rad/s], from
+  /// the neighbouring readings; at the end of the log, from the last two.
   [[nodiscard]] Eigen::Vector2d rate(std::size_t head, double t_s) const {
     const auto& readings = of_head_[head];
     auto before = std::ranges::lower_bound(readings, t_s, {}, &Reading::t_s);
@@ -59,7 +59,7 @@ class ReadingLog {
   std::vector<std::vector<Reading>> of_head_;
 };
 
-/// Where the target goes if all heads read their angles so much before their images. None where it is not determined.
+/// Shift of the target if all heads read their angles `delay_s` before their images. None if it is not determined.
 std::optional<Eigen::Vector3d> moved_by_delay(const ReadingLog& log, std::span<const RigHead> heads,
                                               const TrackStep& step, double delay_s) {
   const auto by = meeting_sensitivity(heads, log.at(step.t_s), step.belief.x.head<3>(), step.belief.x.segment<3>(3));
@@ -70,8 +70,8 @@ std::optional<Eigen::Vector3d> moved_by_delay(const ReadingLog& log, std::span<c
   return moved;
 }
 
-/// Angles that all heads read before their images are taken: the target is where the rays of these angles meet, a
-/// little in its past. As the heads follow it no observation shows that.
+/// All heads read their angles before their images are taken: the target then appears where the rays with these angles
+/// meet, a little in its past. Since the heads follow the target, no observation reveals this.
 std::optional<Assumption> angles_before_images(const ReadingLog& log, std::span<const RigHead> heads,
                                                const TrackReport& report) {
   constexpr std::size_t max_steps = 40;
@@ -101,7 +101,7 @@ std::optional<Assumption> angles_before_images(const ReadingLog& log, std::span<
                         "exactly: --sigma-clock"};
 }
 
-/// The largest of the heads' mean spacings of rows [s].
+/// The largest of the heads' mean row intervals [s].
 double row_spacing_s(std::span<const TargetObservation> observations, std::size_t num_heads) {
   double largest_s = 0.0;
   for (std::size_t h = 0; h < num_heads; ++h) {
@@ -117,8 +117,8 @@ double row_spacing_s(std::span<const TargetObservation> observations, std::size_
   return largest_s;
 }
 
-/// What the commonest delay of angles does, those of the image before: one row, as no observation shows it where the
-/// heads follow the target.
+/// Effect of the most common delay of angles, that of reading them with the image before. Listed as one row, since no
+/// observation reveals it while the heads follow the target.
 Assumption angles_late_alike(const Assumption& angles, double row_s) {
   const double times = row_s / angles.ordinary;
   return {.name = "angles.late_alike",
@@ -132,13 +132,13 @@ Assumption angles_late_alike(const Assumption& angles, double row_s) {
               " mm (" + text_of(times * angles.moves, 2) + "σ) in " + angles.moved.substr(0, 1)};
 }
 
-/// A move of the target at a time.
+/// A shift of the target at a given time.
 struct Move {
   double t_s = 0.0;
   Eigen::Vector3d moved;
 };
 
-/// That of the move nearest in time.
+/// Increases the covariance by the shift nearest in time.
 void widen(const std::vector<Move>& moves, double t_s, Belief<6>& belief) {
   auto nearest = std::ranges::lower_bound(moves, t_s, {}, &Move::t_s);
   if (nearest == moves.end() || (nearest != moves.begin() && t_s - (nearest - 1)->t_s < nearest->t_s - t_s)) --nearest;
@@ -154,7 +154,7 @@ std::vector<Assumption> angles_assumed(std::span<const TargetObservation> observ
   if (!row) return rows;
   const double row_s = row_spacing_s(observations, heads.size());
   if (row_s > 0.0 && row->moves > 0.0) rows.push_back(angles_late_alike(*row, row_s));
-  if (sigma_s > 0.0) {  // counted: count_angle_delay()
+  if (sigma_s > 0.0) {  // included in the covariance by count_angle_delay()
     for (Assumption& alike : rows) alike.sigma = sigma_s;
     row->moves *= sigma_s / row->ordinary;
     row->moved_by *= sigma_s / row->ordinary;
@@ -166,7 +166,7 @@ std::vector<Assumption> angles_assumed(std::span<const TargetObservation> observ
 
 void count_angle_delay(std::span<const TargetObservation> observations, std::span<const RigHead> heads, double sigma_s,
                        TrackReport& report) {
-  constexpr std::size_t max_moves = 4000;  // between them it changes little
+  constexpr std::size_t max_moves = 4000;  // the shift changes little between them
   const ReadingLog log(observations, heads.size());
   std::vector<Move> moves;
   for (std::size_t i = 0; i < report.steps.size(); i += 1 + report.steps.size() / max_moves) {

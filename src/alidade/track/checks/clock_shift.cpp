@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t num_blocks = 8;
 
-/// −ln p of the observations in each eighth of the log, the target's acceleration being what makes all of them most
-/// probable.
+/// −ln p of the observations in each eighth of the log, for the acceleration of the target that maximises their joint
+/// likelihood.
 struct BlockCosts {
   std::array<double, num_blocks> block{};
   double nis_per_dof = 0.0;
@@ -26,7 +26,7 @@ struct BlockCosts {
   }
 };
 
-/// Rows of a long log are taken evenly from all of it, eight stretches.
+/// At most `most` rows: a longer log is represented by eight stretches, evenly spaced.
 std::vector<std::vector<TargetObservation>> stretches_of(std::span<const TargetObservation> observations,
                                                          std::size_t most) {
   std::vector<std::vector<TargetObservation>> stretches;
@@ -51,7 +51,7 @@ void add_costs(const TrackReport& report, std::span<const TargetObservation> obs
     double cost = 0.5 * gate;
     if (step.has_innovation)
       cost = 0.5 * (std::min(step.innovation.nis, gate) + std::log(step.innovation.S.determinant()));
-    if (step.event == TrackEvent::restart) cost += gate;  // it hides its misfit
+    if (step.event == TrackEvent::restart) cost += gate;  // a restart hides its misfit
     costs.block[block] += cost;
     if (!step.has_innovation) continue;
     nis += std::min(step.innovation.nis, gate);
@@ -67,7 +67,7 @@ BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches
   plain.tracker.learn_errors = plain.tracker.errors.num() > 0 && plain.tracker.method != TargetMotion::imm;
   BlockCosts best;
   double least = std::numeric_limits<double>::infinity();
-  // A right clock makes a target calmer, never more manoeuvring.
+  // With the correct clock a target manoeuvres less, never more.
   const int max_halvings = config.find_sigma_a ? 5 : 1;
   for (int k = 0; k < max_halvings; ++k) {
     plain.tracker.sigma_a_m_s2 = config.tracker.sigma_a_m_s2 * std::pow(0.5, k);
@@ -78,7 +78,7 @@ BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches
       add_costs(track_target(shifted, heads, plain), shifted, plain.tracker.gate, s, stretches.size() == 1, costs, nis,
                 num);
     }
-    if (!(costs.sum() < least)) break;  // the likelihood of a manoeuvre's size has one top
+    if (!(costs.sum() < least)) break;  // the likelihood of σ_a has a single maximum
     least = costs.sum();
     best = costs;
     best.nis_per_dof = num > 0.0 ? nis / num : std::numeric_limits<double>::infinity();
@@ -86,9 +86,9 @@ BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches
   return best;
 }
 
-/// Whether the gain comes from more than one part of the log.
+/// Whether the gain is not due to one part of the log only.
 bool is_throughout(const BlockCosts& given, const BlockCosts& shifted) {
-  constexpr double min_elsewhere = 10.0;  // of ln p, without the eighth that gains most
+  constexpr double min_elsewhere = 10.0;  // in ln p, without the eighth that gains most
   double sum = 0.0, most = 0.0;
   for (std::size_t k = 0; k < num_blocks; ++k) {
     const double gain = given.block[k] - shifted.block[k];
@@ -98,7 +98,7 @@ bool is_throughout(const BlockCosts& given, const BlockCosts& shifted) {
   return sum - most > min_elsewhere;
 }
 
-/// Of the rivals the one that makes the observations most probable, if that is as probable as the shift makes them.
+/// Of the rivals, notes the one with the highest likelihood, if that is about as high as with the shift.
 void note_rival(const std::vector<std::vector<TargetObservation>>& stretches, std::span<const RigHead> heads,
                 const FollowConfig& config, std::span<const RigFault> rivals, double cost_as_given, ClockShift& shift) {
   constexpr double clear = 3.0;
@@ -119,7 +119,7 @@ std::vector<TargetObservation> with_shift(std::span<const TargetObservation> obs
   std::vector<TargetObservation> shifted(observations.begin(), observations.end());
   for (TargetObservation& observation : shifted) {
     if (observation.head == shift.head) observation.t_capture_s += shift.later_s;
-    observation.t_arrival_s = observation.t_capture_s;  // what is probable does not depend on what arrived first
+    observation.t_arrival_s = observation.t_capture_s;  // the likelihood must not depend on the order of arrival
   }
   std::ranges::stable_sort(shifted, {}, &TargetObservation::t_capture_s);
   return shifted;
@@ -129,7 +129,7 @@ std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation
                                                std::span<const RigHead> heads, const FollowConfig& config,
                                                std::span<const RigFault> rivals) {
   const std::size_t max_observations =
-      config.tracker.errors.num() > 0 ? 1200 : 4000;  // learning costs several times more
+      config.tracker.errors.num() > 0 ? 1200 : 4000;  // learning is several times slower
   constexpr double min_gain = 20.0, nis_that_fits = 1.5;
   if (observations.size() < 2 * num_blocks) return std::nullopt;
   const auto stretches = stretches_of(with_shift(observations, {}), max_observations);

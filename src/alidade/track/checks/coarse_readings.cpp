@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// The step whose multiples all readings of an axis are; 0: none, or too few of them.
+/// The step of which all readings of an axis are multiples; 0: none, or too few readings.
 double reading_step_rad(std::span<const TargetObservation> observations, std::size_t head, int axis) {
   constexpr std::size_t least = 5;
   constexpr double same_rad = 1e-6, whole = 0.02;
@@ -32,7 +32,7 @@ double reading_step_rad(std::span<const TargetObservation> observations, std::si
 
 std::optional<Check> coarse_readings(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                      const FollowConfig& config) {
-  constexpr double more = 1.5;  // than is stated
+  constexpr double more = 1.5;  // times the stated σ
   std::optional<Check> coarsest;
   for (std::size_t head = 0; head < heads.size(); ++head) {
     const double own = heads[head].head.encoder.sigma_rad;

@@ -11,11 +11,11 @@
 namespace alidade {
 namespace {
 
-/// Pixels of a few rows of a head, one after another, of which none repeats the one before: of two heads that keep a
-/// target central by whole pixels single ones agree by chance.
+/// Pixels of a few consecutive rows of a head, none equal to the one before: single
+/// rows of two heads that keep a target centred to whole pixels agree by chance.
 using PixelRun = std::array<double, 8>;
 
-/// When each run of a head began.
+/// Start time of each run of a head.
 std::multimap<PixelRun, double> pixel_runs(std::span<const TargetObservation> sorted, std::size_t head) {
   std::multimap<PixelRun, double> runs;
   std::vector<const TargetObservation*> last;

@@ -5,19 +5,19 @@
 #include "alidade/estimation/median.h"
 #include "alidade/track/checks/explanation.h"
 
-// Heads' numbers that are exchanged for a while: of rows there, rays meet once each is of the other head.
+// Two heads' numbers that are exchanged for a while: there the rays meet if each row is assigned to the other head.
 
 namespace alidade {
 namespace {
 
-/// A row of two heads' with its ray as labelled, and as of the other head.
+/// A row of one of two heads with its ray as labelled, and as seen from the other head.
 struct TwoRays {
   double t_s = 0.0;
   bool is_second = false;
   WorldRay own, other;
 };
 
-/// Rows of two heads in order of time.
+/// The rows of two heads in temporal order.
 std::vector<TwoRays> two_rays(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                               std::size_t a, std::size_t b) {
   std::vector<TwoRays> rows;
@@ -30,7 +30,7 @@ std::vector<TwoRays> two_rays(std::span<const TargetObservation> observations, s
   return rows;
 }
 
-/// By what angle two rays miss each other, seen from the mean of their origins; π where they meet behind one.
+/// Angle by which two rays miss each other, seen from the mean of their origins; π if they meet behind one of them.
 double miss_rad(const WorldRay& a, const WorldRay& b) {
   constexpr double never = 3.14, parallel = 1e-9;
   const Eigen::Vector3d apart = b.origin_in_world - a.origin_in_world;
@@ -51,7 +51,7 @@ struct Misses {
   std::vector<double> t_s, as_given, exchanged;
 };
 
-/// Of each row with the other head's ray at its time, where that has rows shortly before and after.
+/// Misses of each row with the other head's ray at its time, if that head has rows shortly before and after.
 Misses misses_of(const std::vector<TwoRays>& rows) {
   constexpr double near_s = 0.3;
   Misses misses;
@@ -75,7 +75,7 @@ struct Stretch {
   bool is_found = false;
 };
 
-/// The time in which nearly all rows agree once they are exchanged, and do not as given.
+/// The time span in which nearly all rows agree after exchange, and do not as given.
 Stretch exchanged_stretch(const Misses& misses) {
   constexpr double clearly = 8.0, least_rad = 1e-3, nearly_all = 0.8;
   constexpr std::size_t least = 8;

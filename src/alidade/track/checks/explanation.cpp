@@ -49,7 +49,7 @@ std::string head_name(std::span<const RigHead> heads, std::size_t head) {
 
 using Change = std::function<void(TargetObservation&)>;
 
-/// Of one head's observations, or of all.
+/// A misreading of one head's observations, or of all.
 TableMisreading misreading_of(std::optional<std::size_t> head, const std::string& what, const std::string& to_do,
                               const Change& change) {
   return {{what, to_do}, [head, change](TargetObservation& observation) {
@@ -57,7 +57,7 @@ TableMisreading misreading_of(std::optional<std::size_t> head, const std::string
           }};
 }
 
-/// The signs of one head, or of all.
+/// Wrong signs of one head's angles, or of all heads'.
 void add_signs(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<TableMisreading>& all) {
   const std::string of = head ? " of " + head_name(heads, *head) : "";
   all.push_back(misreading_of(head, "pan" + of + " with the wrong sign",
@@ -68,7 +68,7 @@ void add_signs(std::span<const RigHead> heads, std::optional<std::size_t> head, 
                               [](TargetObservation& observation) { observation.pan_tilt_rad.y() *= -1.0; }));
 }
 
-/// The mirrors of one head, or of all.
+/// Mirrored images of one head, or of all.
 void add_mirrors(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<TableMisreading>& all) {
   const auto mirrored = [heads](TargetObservation& observation, int axis) {
     const Camera& camera = heads[observation.head].camera;
@@ -87,7 +87,7 @@ void add_mirrors(std::span<const RigHead> heads, std::optional<std::size_t> head
                               }));
 }
 
-/// Columns that are named as one another, of one head, or of all.
+/// Exchanged columns of one head, or of all.
 void add_exchanges(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<TableMisreading>& all) {
   const std::string of = head ? " of " + head_name(heads, *head) : "";
   all.push_back(misreading_of(
@@ -123,7 +123,7 @@ std::vector<TableMisreading> misreadings(const Observations& given, std::span<co
   return all;
 }
 
-/// Of three heads or more the one without which the others' observations fit.
+/// Of three or more heads, the one without which the observations of the others fit.
 std::optional<Explanation> foreign_head(const Observations& observations, std::span<const RigHead> heads,
                                         const FollowConfig& config) {
   std::optional<Explanation> found;
@@ -131,7 +131,7 @@ std::optional<Explanation> foreign_head(const Observations& observations, std::s
     Observations others = observations;
     std::erase_if(others, [&](const TargetObservation& observation) { return observation.head == head; });
     if (others.size() == observations.size() || !tried(others, heads, config).fits) continue;
-    if (found) return std::nullopt;  // of two that could be it neither is named
+    if (found) return std::nullopt;  // if two heads qualify, neither is named
     found = {
         "the observations of " + head_name(heads, head) + " agree with none of the other heads, which agree",
         "its row in the rig file is that of another head, or its events are: remove it, or calibrate at its present "
@@ -158,9 +158,9 @@ std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) 
 
 namespace {
 
-constexpr double clear = 15.0;  // of ln p: by chance alone never
+constexpr double clear = 15.0;  // in ln p: never by chance alone
 
-/// The first observations, in order of capture.
+/// The first observations (up to a limit) in order of capture.
 Observations some_of(std::span<const TargetObservation> observations, std::span<const RigHead> heads) {
   constexpr std::size_t max_observations = 1200;
   Observations some = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
@@ -171,21 +171,21 @@ Observations some_of(std::span<const TargetObservation> observations, std::span<
 struct Likelier {
   double ln_p = 0.0;
   Explanation explanation;
-  Observations observations;  ///< As they would be.
+  Observations observations;  ///< With the misreading undone.
 };
 
-/// The misreading without which observations fit and are by far more probable; two of them where they are nearly alike.
+/// The misreading without which the observations fit with a far higher likelihood; two if nearly equally likely.
 std::optional<Likelier> likeliest(const Observations& given, std::span<const RigHead> heads, const FollowConfig& config,
                                   std::span<const TableMisreading> all) {
   constexpr std::size_t first_observations = 160;
-  constexpr double min_gain = 30.0, of_gain = 0.03;  // no motion model is right to more
+  constexpr double min_gain = 30.0, of_gain = 0.03;  // no motion model is more accurate
   const double as_given = tried(given, heads, config).ln_p;
   std::vector<Likelier> fitting;
   for (const TableMisreading& misreading : all) {
     Observations changed = given;
     for (TargetObservation& observation : changed) misreading.undo(observation);
     changed = with_shift(changed, {});
-    // What does not fit a few hundred observations does not fit all of them.
+    // A misreading that does not fit the first observations does not fit all of them.
     const Observations some(
         changed.begin(), changed.begin() + static_cast<std::ptrdiff_t>(std::min(changed.size(), first_observations)));
     if (changed.size() > 2 * first_observations && !tried(some, heads, config).fits) continue;
@@ -204,14 +204,14 @@ std::optional<Likelier> likeliest(const Observations& given, std::span<const Rig
   return best;
 }
 
-/// Of a target that moves as it is said to, or that may fall, whichever is more probable.
+/// ln p for the given motion of the target or for one that may fall, whichever is larger.
 double ln_p_of(const Observations& observations, std::span<const RigHead> heads, FollowConfig config) {
   const double as_said = tried(observations, heads, config).ln_p;
   config.tracker.method = TargetMotion::imm;
   return std::max(as_said, tried(observations, heads, config).ln_p);
 }
 
-/// How probable the observations are under the likeliest other thing that may be amiss.
+/// ln p of the observations under the likeliest of the other explanations.
 double ln_p_of_rivals(const Observations& given, std::span<const RigHead> heads, const FollowConfig& config,
                       std::span<const RigFault> faults) {
   double most = ln_p_of(given, heads, config);
@@ -230,7 +230,7 @@ std::optional<Explanation> misread_table(std::span<const TargetObservation> obse
                                          std::span<const RigHead> heads, const FollowConfig& config,
                                          std::span<const RigFault> faults) {
   std::vector<TableMisreading> mirrors;
-  add_turned(heads, std::nullopt, mirrors);  // tilt of heads side by side that counts downwards does what flips do
+  add_turned(heads, std::nullopt, mirrors);  // for heads side by side, a tilt that counts downwards acts like a flip
   for (std::size_t head = 0; head < std::min<std::size_t>(heads.size(), 4); ++head) add_mirrors(heads, head, mirrors);
   const Observations given = some_of(observations, heads);
   std::optional<double> rivals;
@@ -253,7 +253,7 @@ std::optional<Explanation> explanation_of(std::span<const TargetObservation> obs
 
 namespace {
 
-/// How many pairs of observations there are at a time, and of them, with parallel rays.
+/// Number of simultaneous pairs of observations, and of those with parallel rays.
 struct PairCounts {
   std::size_t together = 0, parallel = 0;
 };
@@ -301,7 +301,7 @@ Explanation why_no_start(std::span<const TargetObservation> observations, std::s
 
 namespace {
 
-constexpr double good_share = 0.95;  // of the observations, used
+constexpr double good_share = 0.95;  // of the observations are used
 
 double ln_p(const TrackReport& report, double gate) {
   return report.log_likelihood - gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
@@ -321,9 +321,9 @@ std::optional<Check> falling_target(std::span<const TargetObservation> observati
   const double as_given = ln_p(track_target(some, heads, plain), config.tracker.gate);
   plain.tracker.method = TargetMotion::imm;
   const TrackReport falls = track_target(some, heads, plain);
-  // Where the noise is larger than stated, so is every logarithm: less by what is left of it (QAIC).
+  // If the noise is larger than stated, so is every log-likelihood: divided by the remaining NIS (QAIC).
   const double gain = (ln_p(falls, config.tracker.gate) - as_given) / std::max(1.0, falls.nis_per_dof);
-  // It explains only what then fits: of clutter both reject as much.
+  // It must also let the observations fit: clutter is rejected by both models.
   if (falls.num_starts == 0 || !(gain > min_gain) ||
       static_cast<double>(falls.num_used) < good_share * static_cast<double>(some.size()))
     return std::nullopt;

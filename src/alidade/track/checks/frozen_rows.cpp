@@ -14,11 +14,11 @@ namespace {
 
 enum class Of { pan, tilt, pixels };
 
-/// One head's pixels or readings in order of time; of a reading only the first number counts.
+/// Pixels or readings of one head in temporal order; for readings only the first component is used.
 struct Series {
   std::vector<double> t_s;
   std::vector<Eigen::Vector2d> values;
-  std::vector<bool> is_taken;  ///< Of a run that was found.
+  std::vector<bool> is_taken;  ///< Belongs to a run found before.
 
   [[nodiscard]] std::size_t num() const { return values.size(); }
   [[nodiscard]] bool repeats(std::size_t k) const { return values[k] == values[k - 1]; }
@@ -35,7 +35,7 @@ Series series_of(std::span<const TargetObservation> sorted, std::size_t head, Of
   return series;
 }
 
-/// The rows first … last − 1 that repeat the one before.
+/// The rows first … last − 1, each equal to the one before.
 struct Run {
   std::size_t first = 0, last = 0;
   [[nodiscard]] std::size_t num() const { return last - first; }
@@ -53,8 +53,8 @@ Run longest_run(const Series& series) {
   return longest;
 }
 
-/// Where the series goes on behind the run, it is far from it by what it does then from row to row, its step left out:
-/// a head or a target that was at rest starts slowly.
+/// Whether the value after the run differs from it by far more than consecutive rows
+/// do afterwards, rounding excluded: a head or target that was at rest starts slowly.
 bool jumps_behind(const Series& series, const Run& run, double step) {
   constexpr std::size_t num_behind = 4;
   constexpr double clearly = 3.0;
@@ -65,13 +65,13 @@ bool jumps_behind(const Series& series, const Run& run, double step) {
   return (series.values[run.last] - series.values[run.last - 1]).norm() - 2.0 * step > clearly * fastest;
 }
 
-/// Of so many rows one run of that length is expected less than once in 10⁴ logs, if that share of them repeats.
+/// Whether a run of that length is expected less than once in 10⁴ logs of so many rows, if `share` of the rows repeat.
 bool is_rare(double share, std::size_t num_rows, const Run& run) {
   constexpr double rare = 1e-4;
   return static_cast<double>(num_rows) * std::pow(share, static_cast<double>(run.num())) < rare;
 }
 
-/// Beyond the rate at which rows outside runs repeat.
+/// Whether the run is not explained by the rate at which rows outside runs repeat.
 bool is_beyond_chance(const Series& series, const Run& run) {
   constexpr std::size_t least = 3, least_others = 16;
   if (run.num() < least) return false;
@@ -85,7 +85,7 @@ bool is_beyond_chance(const Series& series, const Run& run) {
   return others >= static_cast<double>(least_others) && is_rare(share, series.num(), run);
 }
 
-/// The step whose multiples values are, if it is not far below what they change by: rounded ones repeat. 0 of others.
+/// The rounding step of the values, if it is not far below their changes: rounded values repeat. Otherwise 0.
 double step_of(const Series& series) {
   constexpr double finer = 20.0;
   double step = 0.0;
@@ -100,7 +100,7 @@ double step_of(const Series& series) {
   return step;
 }
 
-/// Mean, what is beyond four medians counted as those: medians of what is rounded are coarse.
+/// Mean with values limited to four medians: the median of rounded values is coarse.
 double robust_mean(const std::vector<double>& sizes) {
   const double most = 4.0 * median_of(sizes);
   double sum = 0.0;
@@ -108,11 +108,11 @@ double robust_mean(const std::vector<double>& sizes) {
   return sum / static_cast<double>(sizes.size());
 }
 
-/// σ of the noise of one number from row to row, outside runs; 0 where there is none. Of white noise third differences
-/// are √(20/6) = 1.8 times as large as second ones, whose σ is √6 of its own; of a motion that the rows resolve they
-/// are smaller.
+/// σ of the noise of one component from row to row, outside runs; 0 if there is none.
+/// For white noise, third differences are √(20/6) = 1.8 times as large as second ones,
+/// whose σ is √6 times its own; for a motion that the rows resolve, they are smaller.
 double noise_of(const Series& series, Of of) {
-  constexpr double between = 1.3, normal_mean = 0.7979, rayleigh_mean = 1.2533;  // of |n| in one and in two numbers
+  constexpr double between = 1.3, normal_mean = 0.7979, rayleigh_mean = 1.2533;  // mean of |n| in 1 and 2 dimensions
   std::vector<double> second, third;
   const auto& at = series.values;
   for (std::size_t k = 3; k < at.size(); ++k) {
@@ -127,8 +127,8 @@ double noise_of(const Series& series, Of of) {
   return mean / std::sqrt(6.0) / (of == Of::pixels ? rayleigh_mean : normal_mean);
 }
 
-/// The largest share of rows that may repeat though nothing is frozen: of a value at rest in the centre of its step,
-/// with that noise, rounding's own left out.
+/// The largest share of rows that may repeat without being frozen: a value at rest in the centre of its rounding step,
+/// with the given noise less that of rounding.
 double repeats_at_rest(double noise, double step, Of of) {
   const double own = std::sqrt(std::max(0.0, noise * noise - step * step / 12.0));
   if (!(own > 0.0)) return 1.0;
@@ -136,16 +136,16 @@ double repeats_at_rest(double noise, double step, Of of) {
   return of == Of::pixels ? same * same : same;
 }
 
-/// A run, and whether it alone shows that something stood still.
+/// A run, and whether it proves by itself that something was frozen.
 struct Candidate {
   FrozenRows rows;
   bool is_certain = false;
   bool is_to_end = false, jumps_behind = false;
-  double step = 0.0;  ///< Values that are rounded to it repeat while what they are of moves by so much.
+  double step = 0.0;  ///< Rounding step: values repeat while the quantity changes by less.
 };
 
 void add_candidates(Series series, std::size_t head, Of of, std::vector<Candidate>& all) {
-  constexpr std::size_t most = 8;  // of one head's values
+  constexpr std::size_t most = 8;  // per head and kind of value
   const double step = step_of(series);
   const std::size_t before = all.size();
   for (Run run = longest_run(series); is_beyond_chance(series, run) && all.size() < before + most;
@@ -168,13 +168,13 @@ void add_candidates(Series series, std::size_t head, Of of, std::vector<Candidat
     all[k].is_certain = is_rare(share, series.num(), {0, all[k].rows.num});
 }
 
-/// How the track that is without those rows expects them.
+/// How well the track without the candidate's rows predicts them.
 struct Expected {
-  std::size_t num = 0, off = 0;  ///< Rows that it expects somewhere, and those beyond the gate of it.
-  std::size_t beside_off = 0;    ///< Of the head's rows right before and behind those that it rejects.
+  std::size_t num = 0, off = 0;  ///< Number of rows that are predicted, and of those beyond the gate.
+  std::size_t beside_off = 0;    ///< Rejected rows of the head shortly before, within and after the run.
 };
 
-/// NIS of a row by a belief that does not know of it.
+/// NIS of a row with a belief that does not include it.
 double nis_of(const TargetObservation& row, const RigHead& head, const Candidate& of, const Belief<6>& belief,
               const TrackerConfig& config) {
   const double own = head.head.encoder.sigma_rad, sigma_rad = own > 0.0 ? own : config.sigma_encoder_rad;
@@ -197,10 +197,10 @@ double nis_of(const TargetObservation& row, const RigHead& head, const Candidate
 Expected expected_of(const Candidate& candidate, std::span<const TargetObservation> sorted,
                      std::span<const RigHead> heads, const TrackReport& without, const TrackerConfig& config) {
   constexpr std::size_t beside = 3;
-  const double larger = std::max(1.0, without.nis_per_dof);  // noise than stated
+  const double larger = std::max(1.0, without.nis_per_dof);  // noise over the stated one
   const FrozenRows& rows = candidate.rows;
   Expected expected;
-  std::vector<bool> is_off;  // of the head's rows, as the track takes them
+  std::vector<bool> is_off;  // per row of the head, whether the track rejects it
   std::size_t first = 0, last = 0;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const TargetObservation& row = sorted[i];
@@ -219,9 +219,9 @@ Expected expected_of(const Candidate& candidate, std::span<const TargetObservati
   return expected;
 }
 
-/// Whether the track contradicts rows: it fits all others, those right beside them as well (a wrong rig is as wrong
-/// there), and the head jumps behind them (one of two heads alone has a range only as far as the target moves as the
-/// filter assumes). Where one of two heads is left out for a while the range drifts, and begins again.
+/// Whether the track contradicts the rows: it fits all others, including those next to them (a wrong rig would be wrong
+/// there as well), and the head's values jump after them (with one of two heads alone, the range is only as good as the
+/// motion model). While one of two heads is excluded, the range drifts, and the track may restart.
 bool contradicts(const TrackReport& without, const Candidate& candidate, const Expected& expected,
                  std::size_t num_heads) {
   constexpr std::size_t min_off = 3, max_beside_off = 1, max_restarts = 2;
@@ -235,7 +235,7 @@ bool contradicts(const TrackReport& without, const Candidate& candidate, const E
              static_cast<double>(without.steps.size() - num_out);
 }
 
-/// Rows of one head that overlap are one.
+/// Merges overlapping rows of one head.
 std::vector<FrozenRows> merged(std::vector<FrozenRows> all) {
   std::ranges::stable_sort(all, {}, [](const FrozenRows& one) { return std::pair(one.head, one.from_s); });
   std::vector<FrozenRows> result;
@@ -265,7 +265,7 @@ std::vector<Candidate> candidates_of(std::span<const TargetObservation> sorted, 
   return candidates;
 }
 
-/// Whether values are rounded more coarsely than their σ says: then a track is off by more than it says.
+/// Whether values are rounded more coarsely than their σ allows: then the track's errors exceed its σ.
 bool is_coarse(const Candidate& candidate, std::span<const RigHead> heads, const TrackerConfig& config) {
   const double own = heads[candidate.rows.head].head.encoder.sigma_rad;
   const double sigma = candidate.rows.pixels ? config.sigma_px : own > 0.0 ? own : config.sigma_encoder_rad;

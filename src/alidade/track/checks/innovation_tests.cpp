@@ -16,7 +16,7 @@ struct Sums {
   std::optional<Eigen::Vector2d> last;
 };
 
-/// Where a target that moves so goes in the image.
+/// Direction in the image in which the target moves.
 Eigen::Vector2d direction_in_image(const RigHead& head, const TargetObservation& observation, const Belief<6>& belief) {
   const TurnedHead turned(head.head, observation.pan_tilt_rad);
   const auto seen = project(turned, head.camera, belief.x.head<3>());

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A target that --method describes badly leans, too, by up to half of these: see scenario C.
+/// A target that is badly described by --method also biases the innovations, by up to half of these: see scenario C.
 constexpr double min_along = 0.6, min_slope = 1.2;
 
 void take_if_worse(std::string text, double size, double least, double z, Lean& worst) {

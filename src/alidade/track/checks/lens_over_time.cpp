@@ -9,13 +9,13 @@ bool has_history(std::span<const IntrinsicsHistory> histories, std::size_t head)
   return head < histories.size() && !histories[head].lens.empty();
 }
 
-/// σ of fx, fy, cx, cy as the camera's own intrinsics would have it: what moves its pixels as far in the image.
+/// σ of fx, fy, cx, cy converted to the camera's own intrinsics: the one with the same effect on pixels.
 Eigen::Vector4d sigma_in_own(const Camera& camera, const IntrinsicsSample& now) {
   const Eigen::Vector2d ratio = Zoomed(camera, now.k).ratio;
   return now.sigma.cwiseQuotient(Eigen::Vector4d(ratio.x(), ratio.y(), ratio.x(), ratio.y()));
 }
 
-/// Covariance with these four first parameters from `first` on alone, and nothing shared with the others.
+/// Replaces the four parameters from index `first` by independent ones with the given σ.
 void replace_lens(Eigen::MatrixXd& cov, Eigen::Index first, const Eigen::Vector4d& sigma) {
   cov.middleRows<4>(first).setZero();
   cov.middleCols<4>(first).setZero();

@@ -16,12 +16,12 @@
 namespace alidade {
 namespace {
 
-/// Of one head or of all: " of head 2", "".
+/// For one head or for all: " of head 2", "".
 std::string whose(std::span<const RigHead> heads, std::optional<std::size_t> head) {
   return head ? " of head " + std::to_string(heads[*head].head.id) : "";
 }
 
-/// Readings that are right when multiplied by `factor`.
+/// Readings that are correct after multiplication by `factor`.
 struct AngleUnit {
   double factor;
   const char *are, *give;
@@ -32,7 +32,7 @@ constexpr AngleUnit degrees{degree, " in degrees", "in radians"},
     halved{2.0, " half of what the axes turn by", "twice as large"},
     converted_twice{1.0 / degree, " in radians that were converted twice", "converted from degrees once"};
 
-/// Of both axes, or of one.
+/// Both axes or one.
 enum class Axes { both, pan, tilt };
 
 TableMisreading misread_angles(std::span<const RigHead> heads, std::optional<std::size_t> head, Axes axes,
@@ -54,7 +54,7 @@ TableMisreading misread_angles(std::span<const RigHead> heads, std::optional<std
           undo};
 }
 
-/// Pixels that are right in the camera's image when their image is enlarged by `factor`.
+/// Pixels that are correct in the camera's image after enlarging theirs by `factor`.
 TableMisreading misread_pixels(std::span<const RigHead> heads, std::optional<std::size_t> head, double factor) {
   const auto undo = [head, factor](TargetObservation& observation) {
     if (head && observation.head != *head) return;
@@ -70,7 +70,7 @@ TableMisreading misread_pixels(std::span<const RigHead> heads, std::optional<std
           undo};
 }
 
-/// Those that multiply by more than `above`.
+/// Adds the units whose factor exceeds `above`.
 void add_units(std::span<const RigHead> heads, std::optional<std::size_t> head, double above,
                std::vector<TableMisreading>& all) {
   for (const AngleUnit& unit : {degrees, doubled, halved, converted_twice})
@@ -82,7 +82,7 @@ void add_units(std::span<const RigHead> heads, std::optional<std::size_t> head, 
     if (factor > above) all.push_back(misread_pixels(heads, head, factor));
 }
 
-/// By how much a ray misses where another's head sees the target, over the range.
+/// Distance by which a ray misses the intersection with another head's ray, over the range.
 double miss_of(const WorldRay& a, const WorldRay& b) {
   const auto met = nearest_to_rays(a, b);
   if (!met) return std::numeric_limits<double>::infinity();
@@ -91,7 +91,7 @@ double miss_of(const WorldRay& a, const WorldRay& b) {
                                                 : std::numeric_limits<double>::infinity();
 }
 
-/// The median of that, of rays that are interpolated between two of a head to what another one sees between them.
+/// Median of miss_of(), with rays interpolated between two of a head to the time of another head's ray in between.
 double median_miss(std::span<const TargetObservation> observations, std::span<const RigHead> heads, double together_s,
                    const TableMisreading& misreading) {
   constexpr double none = std::numeric_limits<double>::infinity();

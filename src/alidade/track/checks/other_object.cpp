@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// A head's rays in order of time.
+/// The rays of a head in temporal order.
 struct Rays {
   std::vector<double> t_s;
   std::vector<Eigen::Vector3d> directions;
@@ -34,9 +34,9 @@ Rays rays_of(std::span<const TargetObservation> observations, const RigHead& rig
   return result;
 }
 
-/// Where a ray goes from one row to the next, beyond what the rows around it go.
+/// A change of the ray from one row to the next, beyond the rate of the rows around it.
 struct Jump {
-  std::size_t row = 0;  ///< The one behind it.
+  std::size_t row = 0;  ///< The row after the jump.
   Eigen::Vector3d by = Eigen::Vector3d::Zero();
 };
 
@@ -54,7 +54,7 @@ Eigen::Vector3d rate_around(const Rays& rays, std::size_t row) {
   return rate;
 }
 
-/// The largest ones, in order of time: beyond 8σ of what all rows do.
+/// The largest jumps, in temporal order: above 8σ of the changes of all rows.
 std::vector<Jump> jumps_of(const Rays& rays) {
   constexpr double min_sigma = 8.0, max_apart_s = 3.0;
   constexpr std::size_t most = 6;
@@ -74,7 +74,7 @@ std::vector<Jump> jumps_of(const Rays& rays) {
   return all;
 }
 
-/// Rows from one jump to another, or to an end of the log: at most half of the head's, the largest
+/// Rows from one jump to another, or to an end of the log: at most half of the head's rows, largest
 /// jumps first.
 std::vector<OtherObject> candidates_of(const Rays& rays, std::size_t head) {
   constexpr std::size_t min_rows = 4;
@@ -104,7 +104,7 @@ std::vector<OtherObject> candidates_of(const Rays& rays, std::size_t head) {
   return candidates;
 }
 
-/// The rows around those, without them, and where they are among all.
+/// The rows around the candidate's without these, and their indices among all rows.
 struct Others {
   std::vector<TargetObservation> rows;
   std::vector<std::size_t> places;
@@ -132,7 +132,7 @@ Others others_of(std::span<const TargetObservation> observations, const OtherObj
   return others;
 }
 
-/// A track that may be good. Where one of two heads is left out for a while the range drifts, and begins again once.
+/// Whether a track may be good. While one of two heads is excluded, the range drifts, and the track may restart once.
 bool may_be_good(const TrackReport& report) {
   constexpr double min_used = 0.95, max_nis = 1.3;
   return report.num_starts > 0 && report.num_restarts <= 1 &&
@@ -141,7 +141,7 @@ bool may_be_good(const TrackReport& report) {
          alike_per_head(report).empty();
 }
 
-/// The track without those rows fits; how far that with them is off there.
+/// Whether the track without those rows fits; determines how far the track with them is off there.
 bool fits_without(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                   const FollowConfig& config, const TrackReport& report, OtherObject& other) {
   const Others others = others_of(observations, other);
@@ -168,7 +168,7 @@ std::string rows_text(const OtherObject& other, std::span<const RigHead> heads) 
 
 std::optional<OtherObject> other_object(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                         const FollowConfig& config, const TrackReport& report) {
-  constexpr std::size_t most = 4;  // of each head
+  constexpr std::size_t most = 4;  // per head
   std::optional<OtherObject> fewest;
   for (std::size_t head = 0; head < heads.size(); ++head) {
     std::vector<OtherObject> candidates = candidates_of(rays_of(observations, heads[head], head), head);

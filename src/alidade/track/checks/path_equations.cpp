@@ -15,7 +15,7 @@ namespace {
 using Six = Eigen::Matrix<double, 6, 6>;
 using PathState = TargetPath::value_type;
 
-/// Where each head's parameters begin, and how many there are.
+/// First column of each head's parameters, and their total number.
 struct Columns {
   std::vector<Eigen::Index> first;
   Eigen::Index num = 0;
@@ -28,21 +28,21 @@ struct Columns {
   }
 };
 
-/// The normal equations of one instant: its state, its coupling to the instant before, and the right sides: of the
-/// residuals first, then of each parameter (none where only the path is asked for).
+/// The normal equations of one instant: its state, its coupling to the instant before, and the
+/// right-hand sides: that of the residuals, then one per parameter (none if only the path is estimated).
 struct Instant {
   Six A = Six::Zero(), before = Six::Zero();
   Eigen::Matrix<double, 6, Eigen::Dynamic> right;
-  Eigen::Matrix3d seen = Eigen::Matrix3d::Zero();  ///< What its observations add to A.
+  Eigen::Matrix3d seen = Eigen::Matrix3d::Zero();  ///< Part of A that comes from its observations.
 };
 
-/// Normal equations of path and parameters: block-tridiagonal in the path.
+/// Normal equations of path and parameters; block-tridiagonal in the path.
 class Equations {
  public:
   Equations(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
             std::span<const PathState> path, const TrackerConfig& config, double sigma_a_m_s2, bool with_params)
       : columns_(heads), num_(with_params ? columns_.num : 0), whole_(Eigen::MatrixXd::Zero(1 + num_, 1 + num_)) {
-    constexpr double together_s = 1e-4;  // what moves so little may be one state
+    constexpr double together_s = 1e-4;  // within so little time the target is in one state
     const ConstantVelocity motion{sigma_a_m_s2};
     for (std::size_t i = 0; i < observations.size(); ++i) {
       const double dt_s = i > 0 ? observations[i].t_capture_s - observations[instant_starts_].t_capture_s : 0.0;
@@ -67,7 +67,7 @@ class Equations {
     return result;
   }
 
-  /// What suits the observations best, if all parameters are right.
+  /// The path that fits the observations best, if all parameters are correct.
   [[nodiscard]] TargetPath path(std::span<const PathState> linearised) const {
     TargetPath moved(instants_.size());
     for (std::size_t k = instants_.size(); k-- > 0;) {
@@ -85,7 +85,7 @@ class Equations {
   }
 
  private:
-  /// A state after the one before; the first is anywhere.
+  /// Adds a state after the one before; the first has a wide prior.
   void begin(std::optional<double> dt_s, const PathState& before, const PathState& now,
              const ConstantVelocity& motion) {
     constexpr double anywhere_m = 100.0, any_m_s = 100.0;
@@ -140,7 +140,7 @@ class Equations {
     whole_.block(first, first, num, num) += by.transpose() * weighted;
   }
 
-  /// Forward: each state of what is known up to it; whole_ is then of the parameters alone.
+  /// Forward elimination: each state with the information up to it; whole_ then depends on the parameters alone.
   void eliminate() {
     for (std::size_t k = 0; k < instants_.size(); ++k) {
       Instant& now = instants_[k];
@@ -155,7 +155,7 @@ class Equations {
     }
   }
 
-  /// Of 2 n whitened residuals less what the path takes: Σ tr(R⁻¹ J Σ Jᵀ), Σ the smoothed covariance.
+  /// Expected cost of 2 n whitened residuals less what the path absorbs: Σ tr(R⁻¹ J Σ Jᵀ), Σ the smoothed covariance.
   [[nodiscard]] double expected_cost() const {
     double taken = 0.0;
     Six cov = Six::Zero();
@@ -173,22 +173,22 @@ class Equations {
 
   Columns columns_;
   Eigen::Index num_ = 0;
-  Eigen::MatrixXd whole_;  ///< Of the residuals and the parameters.
+  Eigen::MatrixXd whole_;  ///< Block of the residuals and the parameters.
   Eigen::VectorXd seen_;
   std::vector<Instant> instants_;
   std::vector<Six> inverse_;
-  std::vector<std::size_t> at_;  ///< Each observation's instant.
+  std::vector<std::size_t> at_;  ///< Index of each observation's instant.
   std::size_t instant_starts_ = 0, num_observations_ = 0;
 };
 
-/// Where the observation's ray meets those of the other heads' nearest in time.
+/// Intersection of the observation's ray with the temporally nearest rays of the other heads.
 std::optional<Eigen::Vector3d> meeting_at(std::span<const TargetObservation> observations,
                                           const std::vector<std::optional<WorldRay>>& rays, std::size_t at,
                                           double together_s) {
   const auto others_within = [&](std::size_t i) {
     return std::abs(observations[i].t_capture_s - observations[at].t_capture_s) <= together_s;
   };
-  std::vector<std::size_t> met;  // one of each other head
+  std::vector<std::size_t> met;  // one per other head
   const auto note = [&](std::size_t i) {
     if (observations[i].head == observations[at].head || !rays[i]) return;
     for (std::size_t& other : met) {
@@ -215,7 +215,7 @@ std::optional<Eigen::Vector3d> meeting_at(std::span<const TargetObservation> obs
   return Eigen::Vector3d(sum / num);
 }
 
-/// Where rays meet; between, as before.
+/// The intersections of the rays; in between, the last one is kept.
 std::optional<TargetPath> meeting_path(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                        double together_s) {
   std::vector<std::optional<WorldRay>> rays;

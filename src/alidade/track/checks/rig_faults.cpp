@@ -11,11 +11,11 @@
 namespace alidade {
 namespace {
 
-/// A parameter of a head that is tested.
+/// A tested parameter of a head.
 struct Tested {
   std::string name;
-  Eigen::VectorXd step;  ///< Of the head's rows, in the parameter's unit.
-  double large = 1.0;    ///< Errors are smaller.
+  Eigen::VectorXd step;  ///< Change of the head's parameters per unit of it.
+  double large = 1.0;    ///< Larger than any real error.
 };
 
 std::vector<Tested> tested_of(const RigHead& head) {
@@ -40,7 +40,7 @@ std::vector<Tested> tested_of(const RigHead& head) {
   return all;
 }
 
-/// How far each of a head's rays lies off the line from the one before to the one after. [rad]
+/// Distance of each of a head's rays from the line between its neighbours [rad].
 std::vector<double> off_line(std::span<const TargetObservation> observations, std::span<const std::size_t> own,
                              std::span<const Eigen::Vector3d> directions) {
   constexpr double max_apart_s = 0.3;
@@ -54,8 +54,8 @@ std::vector<double> off_line(std::span<const TargetObservation> observations, st
   return off;
 }
 
-/// Without what is false: judged by each head's own observations, so that a fault of the rig rejects nothing. Of a long
-/// log eight stretches.
+/// Removes false observations, judged by each head's own observations only, so that a fault of the rig rejects nothing.
+/// Takes eight stretches of a long log.
 std::vector<TargetObservation> in_line(std::span<const TargetObservation> observations,
                                        std::span<const RigHead> heads) {
   constexpr double max_sigma = 6.0;
@@ -86,8 +86,8 @@ std::vector<TargetObservation> in_line(std::span<const TargetObservation> observ
   return result;
 }
 
-/// By how much the noise's variance is larger than stated: of what neither path nor tested parameters explain. These
-/// are only as large as errors are: a huge scale would explain the readings' noise itself.
+/// Variance of the noise over the stated one, from what neither the path nor the tested parameters explain. These are
+/// limited to the size of real errors, as a huge scale would explain the noise of the readings itself.
 double noise_factor(const PathEquations& given, const Eigen::MatrixXd& large) {
   const Eigen::MatrixXd weight = large.transpose() * given.information * large;
   const Eigen::VectorXd pull = large.transpose() * given.g;
@@ -97,7 +97,7 @@ double noise_factor(const PathEquations& given, const Eigen::MatrixXd& large) {
   return expected > 0.0 ? std::max(1.0, cost / expected) : 1.0;
 }
 
-/// Leaves in the equations what the errors that the rig file allows do not explain.
+/// Eliminates the errors that the rig file allows from the equations.
 void eliminate_errors(const RigUncertainty& errors, PathEquations& given) {
   if (errors.num() == 0) return;
   Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(given.g.size(), errors.num());
@@ -121,7 +121,7 @@ double ln_gain(const RigFault& fault) { return 0.5 * fault.z * fault.z; }
 double refit_ln_gain(const RigFault& fault) { return 0.5 * fault.z_refit * fault.z_refit; }
 double both_gains(const RigFault& fault) { return ln_gain(fault) + refit_ln_gain(fault); }
 
-/// Of parameters that do the same the one that is tested first is named first.
+/// Of parameters with the same effect, the one that is tested first is named first.
 void put_first(std::vector<RigFault>& faults, std::span<const std::string> order) {
   constexpr double same = 0.1;
   std::ranges::stable_sort(faults, std::ranges::greater{}, both_gains);
@@ -134,9 +134,9 @@ void put_first(std::vector<RigFault>& faults, std::span<const std::string> order
   std::rotate(faults.begin(), best, best + 1);
 }
 
-/// All that is tested, and of each a column of all parameters: as large as errors are.
+/// All tested parameters, each with a column over all parameters, scaled to the largest real error.
 struct AllTested {
-  std::vector<RigFault> faults;  ///< `moved` per unit, off as large as errors are.
+  std::vector<RigFault> faults;  ///< `moved` per unit; `off` is the largest real error.
   std::vector<std::string> names;
   Eigen::MatrixXd large;
 
@@ -156,19 +156,19 @@ struct AllTested {
   }
 };
 
-/// How equations are made: the target's motion as it is smoothed and as it may be, and noise.
+/// Options of the equations: motion of the target for smoothing and for testing, and noise.
 struct Making {
   TrackerConfig calm;
   double free_m_s2 = 0.0, noise = 1.0;
 
   explicit Making(const TrackerConfig& config) : calm(config) {
-    // A wrong rig makes a target seem more manoeuvring than any is.
+    // A wrong rig makes a target seem to manoeuvre more than any real one.
     constexpr double max_m_s2 = 3.0, freely = 10.0, min_free_m_s2 = 10.0;
     calm.sigma_a_m_s2 = std::min(max_m_s2, config.sigma_a_m_s2);
     free_m_s2 = std::max(min_free_m_s2, freely * calm.sigma_a_m_s2);
   }
 
-  /// Of noise as stated; none where observations determine no path.
+  /// For noise as stated; none if the observations do not determine a path.
   [[nodiscard]] std::optional<PathEquations> raw(std::span<const TargetObservation> observations,
                                                  std::span<const RigHead> heads) const {
     const auto path = smooth_path(observations, heads, calm);
@@ -178,7 +178,7 @@ struct Making {
     return given;
   }
 
-  /// What the errors that the rig file allows leave of them.
+  /// For the actual noise, with the errors that the rig file allows eliminated.
   [[nodiscard]] PathEquations weighed(PathEquations given) const {
     given.information /= noise;
     given.g /= noise;
@@ -188,8 +188,8 @@ struct Making {
   }
 };
 
-/// What the observations gain where the rig is without the fault, by a step more from there: the score test's parabola
-/// may be too narrow for one parameter and too wide for another that nearly does the same.
+/// The gain of the observations without the fault, by one more step from there: the parabola of the
+/// score test may be too narrow for one parameter and too wide for another with nearly the same effect.
 void refit(RigFault& fault, std::span<const TargetObservation> used, std::span<const RigHead> heads,
            const Making& making, double cost_before) {
   WithoutFault right = without_fault(used, heads, fault);
@@ -203,15 +203,15 @@ void refit(RigFault& fault, std::span<const TargetObservation> used, std::span<c
   direction.segment(first, fault.moved.size()) = fault.moved;
   const double weight = direction.dot(given.information * direction), pull = direction.dot(given.g);
   if (!(weight > 0.0)) return;
-  const double more = pull / weight;  // of what it was off by
+  const double more = pull / weight;  // share of `off`
   fault.z_refit = std::sqrt(std::max(0.0, cost_before - given.cost + pull * pull / weight));
   fault.off *= 1.0 + more;
   fault.moved *= 1.0 + more;
 }
 
-/// Where one is significant, and parameters explain all but noise (of mirrored images none does), those that explain
-/// about as much are compared beyond the score test; not clocks, whose
-/// shift changes the path's own probability.
+/// If a fault is significant, and parameters explain all but noise (for mirrored images none does), compares those that
+/// explain about as much beyond the score test; not clocks, as their
+/// shift changes the probability of the path itself.
 void compare(std::vector<RigFault>& faults, std::span<const TargetObservation> used, std::span<const RigHead> heads,
              const Making& making, double cost_before) {
   constexpr double near = 20.0, significant = 3.5, max_noise = 1.5;
@@ -242,7 +242,7 @@ RigTests rig_faults(std::span<const TargetObservation> observations, std::span<c
     tests.power.push_back({.name = fault.name, .head = fault.head, .step = fault.moved, .largest = fault.off});
     const Eigen::VectorXd direction = tested.large.col(static_cast<Eigen::Index>(k));
     const double weight = direction.dot(given.information * direction), pull = direction.dot(given.g);
-    const double share = pull / weight;  // of what is large
+    const double share = pull / weight;  // share of the largest error
     const bool is_seen = weight > unobservable * direction.cwiseAbs2().dot(given.seen) / making.noise;
     if (is_seen) tests.power.back().z_per_unit = std::sqrt(weight) / fault.off;
     if (is_seen && std::abs(share) < 1.0) fault.z = std::abs(pull) / std::sqrt(weight);

@@ -10,15 +10,15 @@
 namespace alidade {
 namespace {
 
-/// An innovation, and how the target goes in the image.
+/// An innovation, and the motion of the target in the image.
 struct Row {
   Eigen::Vector2d nu, px_per_s;
   Eigen::Matrix2d S;
-  double late_s = 0.0, information = 0.0;  ///< The shift of its time that explains it best, and what that knows.
+  double late_s = 0.0, information = 0.0;  ///< Time shift that explains it best, and the information on it.
 };
 
-/// Of each head in its order, without rejected ones. Where the target went by the belief before the row: the row's own
-/// innovation is no part of it.
+/// For each head in its order, without rejected rows. The motion is that of the belief before the row, which is
+/// independent of the row's own innovation.
 std::vector<std::vector<Row>> rows_of(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                       std::span<const TrackStep> steps, double gate) {
   std::vector<std::vector<Row>> rows(heads.size());
@@ -42,7 +42,7 @@ std::vector<std::vector<Row>> rows_of(std::span<const TargetObservation> observa
   return rows;
 }
 
-/// Without what a constant shift of the head's clock explains.
+/// Removes what a constant shift of the head's clock explains.
 void remove_shift(std::vector<Row>& rows) {
   double pull = 0.0, information = 0.0;
   for (const Row& row : rows) {
@@ -57,7 +57,7 @@ void remove_shift(std::vector<Row>& rows) {
   }
 }
 
-/// ln p of the innovations, times having that variance, all being larger by a factor.
+/// ln p of the innovations for times with that variance, and covariances scaled by a factor.
 double ln_p(const std::vector<std::vector<Row>>& heads, double variance_s2, double factor) {
   double sum = 0.0;
   for (const std::vector<Row>& rows : heads)
@@ -68,7 +68,7 @@ double ln_p(const std::vector<std::vector<Row>>& heads, double variance_s2, doub
   return sum;
 }
 
-/// The factor that makes the innovations most probable.
+/// The factor that maximises the likelihood of the innovations.
 double best_factor(const std::vector<std::vector<Row>>& heads) {
   double nis = 0.0, num = 0.0;
   for (const std::vector<Row>& rows : heads)
@@ -79,7 +79,7 @@ double best_factor(const std::vector<std::vector<Row>>& heads) {
   return num > 0.0 ? nis / num : 1.0;
 }
 
-/// Of the shifts in time with those of the row before, weighed.
+/// Weighted autocorrelation of the time shifts at a lag of one row.
 double autocorrelation(const std::vector<std::vector<Row>>& heads) {
   double lagged = 0.0, power = 0.0;
   for (const std::vector<Row>& rows : heads)

@@ -17,9 +17,9 @@
 namespace alidade {
 namespace {
 
-constexpr double tolerance_s = 2e-6;  // times since 1970 have a resolution of 0.24 µs as double
+constexpr double tolerance_s = 2e-6;  // as double, times since 1970 have a resolution of 0.24 µs
 
-/// In order, each once.
+/// Distinct times in ascending order.
 std::vector<double> times_of(std::span<const TargetObservation> observations) {
   std::vector<double> times;
   for (const TargetObservation& observation : observations)
@@ -30,7 +30,7 @@ std::vector<double> times_of(std::span<const TargetObservation> observations) {
   return times;
 }
 
-/// The step by all times, if they are whole steps of about that size apart; else 0.
+/// The step estimated from all times, if they are whole multiples of it apart and it is about `about_s`; else 0.
 double exact_step(std::span<const double> times, double about_s) {
   const double span_s = times.back() - times.front(), step_s = span_s / std::round(span_s / about_s);
   const bool are_whole = std::ranges::all_of(times, [&](double t_s) {
@@ -48,8 +48,8 @@ long most_frequent(std::span<const long> intervals) {
   return std::ranges::max_element(num, {}, [](const auto& one) { return one.second; })->first;
 }
 
-/// Intervals about as long as the usual one, and neither it nor its gaps, come again and again. Where images are gone
-/// from one at every step, one step is the usual; where most of them are, intervals are of any length.
+/// Whether intervals near the usual one, but neither it nor its multiples (gaps), recur. If images are missing from a
+/// camera with one per step, the usual interval is one step; if most are missing, intervals have any length.
 bool are_irregular(std::span<const long> intervals, long usual) {
   const auto num = std::ssize(intervals);
   const long middle = median_of(std::vector<long>(intervals.begin(), intervals.end()));
@@ -62,7 +62,7 @@ bool are_irregular(std::span<const long> intervals, long usual) {
   return odd >= 8 && 10 * odd >= num;
 }
 
-/// The longest stretch of intervals of `shorter` or one more.
+/// The longest sequence of intervals of `shorter` or `shorter` + 1 steps.
 std::span<const long> longest_stretch(std::span<const long> intervals, long shorter) {
   std::span<const long> longest;
   for (std::size_t begin = 0, end = 0; begin < intervals.size(); begin = end + 1) {
@@ -72,8 +72,8 @@ std::span<const long> longest_stretch(std::span<const long> intervals, long shor
   return longest;
 }
 
-/// Images at a constant rate between the steps have such intervals: with their sums as times, one line by their number
-/// is nowhere more than a step off, and a little for the camera's own jitter.
+/// Whether images at a constant rate between the steps have such intervals: their cumulative sums are within one step,
+/// plus a little jitter of the camera, of a straight line.
 bool are_of_one_rate(std::span<const long> intervals) {
   constexpr double within = 1.2;
   double low = 0.0, high = std::numeric_limits<double>::infinity();
@@ -103,7 +103,7 @@ bool are_between_steps(std::span<const double> times_s, double step_s) {
     if (shorter < 1) continue;
     std::span<const long> stretch = longest_stretch(intervals, shorter);
     stretch = stretch.first(static_cast<std::size_t>(std::min(std::ssize(stretch), max_stretch)));
-    // One step and two may be gaps: that those lie as evenly as that takes more of them.
+    // Intervals of one and two steps may be gaps: more are needed to show that they are evenly spaced.
     const std::ptrdiff_t least = shorter > 1 ? 4 : 8, num = std::ranges::count(stretch, shorter);
     const bool has_both = std::min(num, std::ssize(stretch) - num) >= least;
     if (std::ssize(stretch) >= min_stretch && has_both && are_of_one_rate(stretch)) return true;
@@ -196,7 +196,7 @@ std::string step_text(const StepMove& move) {
 
 double step_that_explains(std::span<const TargetObservation> observations, const TrackReport& report,
                           const std::optional<ClockShift>& shift) {
-  constexpr double slack_s = 0.003;  // clocks are known to about that
+  constexpr double slack_s = 0.003;  // clocks are known to about that [s]
   double off_s = 0.0;
   if (shift && !shift->is_worse_than_rival()) off_s = std::abs(shift->later_s);
   if (!(off_s > 0.0) && !alike_per_head(report).empty())
@@ -214,13 +214,13 @@ std::string rounding_text(double step_s) {
 }
 
 std::string rounding_remedy(double step_s) {
-  // RMS of what rounding down takes: uniform from 0 to the step.
+  // RMS of the error of rounding down: uniform from 0 to the step.
   return "write t_capture_s as exactly as it is known, or give --sigma-clock " + text_of(step_s / std::sqrt(3.0), 2);
 }
 
 namespace {
 
-/// Between one row of a head and its next, of the head that is seen the most often.
+/// Mean interval between the rows of the head with the shortest one [s].
 double usual_spacing_s(std::span<const TargetObservation> observations, std::size_t num_heads) {
   double least_s = std::numeric_limits<double>::infinity();
   for (std::size_t head = 0; head < num_heads; ++head) {
@@ -234,7 +234,7 @@ double usual_spacing_s(std::span<const TargetObservation> observations, std::siz
   return std::isfinite(least_s) ? least_s : 0.0;
 }
 
-/// How the observations fare at the times that `scaled` gives them, if they then fit and are far more probable.
+/// Whether the observations fit with the times from `scaled`, and with a far higher likelihood.
 template <class Scaled>
 bool are_likelier(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                   const FollowConfig& config, const Scaled& scaled) {

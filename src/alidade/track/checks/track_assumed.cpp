@@ -13,11 +13,11 @@ namespace alidade {
 namespace {
 
 constexpr double ordinary_f = 0.003, ordinary_centre_px = 2.0, ordinary_scale = 0.005;
-constexpr double ordinary_turn_rad = 0.0017453292519943295;  // 0.1°: how well a mounting is set by hand and eye
+constexpr double ordinary_turn_rad = 0.0017453292519943295;  // 0.1°: accuracy of a mounting set by hand and eye
 constexpr double ordinary_clock_s = 0.005;
 constexpr std::array<const char*, 3> coordinates{"x_m", "y_m", "z_m"};
 
-/// The step whose target is nearer than half of the others', and what the heads read about it.
+/// The step with the median distance of the target, and the heads' readings at about its time.
 struct Median {
   const TrackStep* step = nullptr;
   std::vector<HeadReading> readings;
@@ -40,7 +40,7 @@ Median median_of_steps(std::span<const TargetObservation> observations, std::spa
   return median;
 }
 
-/// The assumptions, and what each does to the target's position.
+/// Collects the assumptions with their effects on the position of the target.
 class Lister {
  public:
   Lister(const Rig& rig, const Median& median) : rig_(rig), median_(median) {
@@ -50,7 +50,7 @@ class Lister {
   }
   std::vector<Assumption> assumed;
 
-  /// `columns`: of a head's parameters, each with its share of the error.
+  /// `columns`: parameters of the head, each with its share of the error.
   void add(Assumption what, std::size_t head, const std::vector<std::pair<Eigen::Index, double>>& columns) {
     const double error = what.sigma.value_or(what.ordinary);
     if (head < by_.size() && by_[head].size() > 0) {
@@ -92,7 +92,7 @@ class Lister {
           h, {{num_head_params + k, 1.0}});
   }
 
-  /// Heads beyond the first stand to it as the file says.
+  /// The mounting of heads after the first relative to it, as in the rig file.
   void add_mounting(std::size_t h) {
     const Eigen::Index yaw = num_head_params * static_cast<Eigen::Index>(h) + 4;
     const bool is_given = rig_.cov.rows() > yaw;
@@ -137,7 +137,7 @@ class Lister {
   std::vector<Eigen::MatrixXd> by_;
 };
 
-/// By how much a third more or less of acceleration moves the track: RMS over its steps, in σ of each.
+/// Displacement of the track with a third more acceleration: RMS over its steps, in σ of each.
 double moved_by_motion(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                        const FollowConfig& config, const TrackReport& report) {
   constexpr std::size_t max_observations = 2000;
@@ -156,7 +156,7 @@ double moved_by_motion(std::span<const TargetObservation> observations, std::spa
   return num > 0.0 ? std::sqrt(sum / num) : 0.0;
 }
 
-/// One row for what of the rig no test sees; what it stands for has its own σ, so that it has no say in the verdict.
+/// One row for the untested parameters of the rig; each has its own σ in other rows, so it does not affect the verdict.
 std::optional<Assumption> not_tested(std::span<const TargetObservation> observations, const Rig& rig,
                                      const FollowConfig& config, const TrackReport& report) {
   const UnseenErrors unseen = unseen_errors(observations, rig.heads, config.tracker, rig.cov.size() > 0, report);
@@ -168,8 +168,8 @@ std::optional<Assumption> not_tested(std::span<const TargetObservation> observat
   return row;
 }
 
-/// One row for times that may have been rounded. Of true ones they differ in nothing, so that it has no say, either;
-/// where they differ, the answer's σ counts it.
+/// One row for times that may have been rounded. They cannot be distinguished from exact ones, so the row does not
+/// affect the verdict; if they can, σ of the answer includes the rounding.
 std::optional<Assumption> times_not_tested(std::span<const TargetObservation> observations, const TrackReport& report,
                                            double sigma_clock_s) {
   if (report.rounded)
@@ -188,8 +188,8 @@ std::optional<Assumption> times_not_tested(std::span<const TargetObservation> ob
   return row;
 }
 
-/// One row for times of all heads that are late alike: the target is where it was so much earlier, and nothing shows
-/// it.
+/// One row for times of all heads that are equally late: the target is then where it was that much earlier, which no
+/// observation reveals.
 Assumption times_late_alike(const TrackReport& report, double sigma_clock_s) {
   const StepMove move = move_by_time(ordinary_clock_s, report);
   return {.name = "times.late_alike",
@@ -261,7 +261,7 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
   for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_scales(h);
   if (given.sigma_clock_s > 0.0)
     for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_clock(h, given.sigma_clock_s);
-  if (given.sigma_px)  // weighs the observations, and moves no one's mean: NIS judges it
+  if (given.sigma_px)  // weights the observations without biasing them: tested by NIS
     lister.assumed.push_back({.name = "sigma_px", .value = config.tracker.sigma_px, .sigma = 0.0});
   Assumption motion{.name = "motion_" + std::string(motion_name(config.tracker.method)) + ".sigma_a_m_s2",
                     .value = report.sigma_a_m_s2,
@@ -269,7 +269,7 @@ std::vector<Assumption> track_assumed(std::span<const TargetObservation> observa
                     .remedy = "leave --sigma-a out, or try --method imm"};
   if (median.step != nullptr) motion.moves = moved_by_motion(observations, rig.heads, config, report);
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
-  if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations say
+  if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations determine it
   lister.assumed.push_back(std::move(motion));
   for (Assumption& row : angles_assumed(observations, rig.heads, report, given.sigma_clock_s))
     lister.assumed.push_back(std::move(row));

@@ -20,8 +20,8 @@
 namespace alidade {
 namespace {
 
-constexpr double good_nees = 2.0, max_nees = 9.0;  // per degree of freedom, where the truth is given
-constexpr double good_nees_of_one = 3.8;           // where errors do not change along a track: 99 % of three components
+constexpr double good_nees = 2.0, max_nees = 9.0;  // per degree of freedom, if the truth is given
+constexpr double good_nees_of_one = 3.8;           // for errors that are constant along a track: 99 %, three components
 constexpr double care_rejected = 0.05, max_rejected = 0.2;
 constexpr double min_used_share = 0.7;
 
@@ -41,7 +41,7 @@ bool fits(const TrackReport& report) {
 using Observations = std::vector<TargetObservation>;
 using Fault = Explanation;
 
-/// Pixels beyond the image of the rig's camera: the rig file is of another camera.
+/// Pixels outside the image of the rig's camera: the rig file is for another camera.
 std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetObservation> observations,
                                   std::span<const RigHead> heads) {
   constexpr double max_share = 0.05;
@@ -74,7 +74,7 @@ Check check(std::string name, State state, std::string text, double value, doubl
   return {std::move(name), state, std::move(text), value, limit, std::move(unit), "track"};
 }
 
-/// Whether innovations are white, and what of the rig the observations contradict.
+/// Checks whether innovations are white, and which parameters of the rig the observations contradict.
 void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
   const Lean lean = worst_lean(report, heads);
   const Check lean_check =
@@ -95,7 +95,7 @@ void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdic
                                    std::sqrt(report.inflation), 1.0, "1"));
 }
 
-/// Only who has the truth sees a wrong focal length: a head that follows keeps the target central.
+/// Only a comparison with the truth shows a wrong focal length, as a following head keeps the target centred.
 Check truth_check(const TrackReport& report) {
   const double nees = report.nees_per_dof, ratio = std::sqrt(nees);
   const double max_good = report.errors_are_counted ? good_nees_of_one : good_nees;
@@ -133,7 +133,7 @@ void add_checks(const TrackReport& report, bool is_stated, Verdict& verdict) {
         check("late", State::care, text_of(late, 2) + " observations came too late", late, 0.0, "observations"));
 }
 
-/// Observations that were rejected and follow a path of their own.
+/// Rejected observations that follow a path of their own.
 std::optional<Check> second_target(const TrackReport& report, std::span<const TargetObservation> observations,
                                    std::span<const RigHead> heads, const FollowConfig& config) {
   constexpr std::size_t least = 16;
@@ -154,14 +154,14 @@ std::optional<Check> second_target(const TrackReport& report, std::span<const Ta
                used_share(second), min_share, "1");
 }
 
-/// What of the observations as a whole is not as stated.
+/// What is wrong with the observations as a whole.
 struct Causes {
   std::optional<Fault> mistake;
   std::optional<Check> second, falls, coarse;
   std::optional<ClockShift> shift;
   std::optional<OtherObject> other;
   std::optional<VelocityJumps> jumps;
-  double step_s = 0.0;  ///< Of all times, if rounding to it explains as much.
+  double step_s = 0.0;  ///< Rounding step of all times, if that explains as much.
 };
 
 bool is_doubtful(const TrackReport& report) {
@@ -196,13 +196,13 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   if (is_odd && !is_explained && !is_jitter) causes.mistake = explanation_of(observations, heads, config, fits(report));
   if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
   causes.shift = probable_clock_shift(observations, heads, found, rivals_of_clocks(report));
-  // A head with a wrong clock agrees with none of the others, either.
+  // A head with a wrong clock also agrees with none of the others.
   if (causes.mistake && !causes.shift) return causes;
   causes.mistake.reset();
   if (causes.shift && causes.shift->is_worse_than_rival() && !alike_per_head(report).empty()) causes.shift.reset();
   if (is_explained || is_jitter) return causes;
   causes.second = second_target(report, observations, heads, found);
-  constexpr double half_gravity_m_s2 = 5.0;  // a target that falls asks for as much, also below larger noise
+  constexpr double half_gravity_m_s2 = 5.0;  // a falling target requires as much, even with larger noise
   const bool may_fall = report.sigma_px_is_found && report.sigma_a_m_s2 > half_gravity_m_s2;
   if (report.num_restarts > 0 || report.nis_per_dof > good_nis_high || may_fall)
     causes.falls = falling_target(observations, heads, config);
@@ -213,7 +213,7 @@ std::string clocks_text(const Causes& causes, std::span<const RigHead> heads) {
   return clock_text(*causes.shift, heads) + (causes.step_s > 0.0 ? "; " + rounding_text(causes.step_s) : "");
 }
 
-/// Bad where the track followed what it should not have.
+/// Bad if the track followed the other object.
 void add_other(const OtherObject& other, std::span<const RigHead> heads, Verdict& verdict) {
   constexpr double max_sigma = 5.0;
   verdict.checks.push_back(check("other object", other.moved_in_sigma > max_sigma ? State::bad : State::care,
@@ -229,7 +229,7 @@ void add_clocks(const TrackReport& report, const Causes& causes, std::span<const
   if (report.rounded && !(causes.step_s > 0.0)) verdict.checks.push_back(rounded_check(*report.rounded));
 }
 
-/// What to do about times that are not those of the images; what they scatter by is less than what they are late by.
+/// What to do about times that differ from those of the images; their scatter matters less than their delay.
 void set_times_remedy(const TrackReport& report, const Causes& causes, Verdict& verdict) {
   if (causes.step_s > 0.0) verdict.to_add = rounding_remedy(causes.step_s);
   if (report.jitter) verdict.to_add = jitter_remedy();
@@ -241,7 +241,7 @@ void set_times_remedy(const TrackReport& report, const Causes& causes, Verdict& 
 std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
                                 std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                 const FollowConfig& config) {
-  // Where nothing moves against the heads, many a mistake would make the rays meet: that explains nothing.
+  // If nothing moves relative to the heads, many mistakes would make the rays meet, which explains nothing.
   if (report.num_starts == 0 && are_parallel(observations, heads, config))
     return why_no_start(observations, heads, config);
   const double late = static_cast<double>(count(report, TrackEvent::late)) / static_cast<double>(report.steps.size());
@@ -277,7 +277,7 @@ std::string sentence_of(const TrackReport& report, std::size_t num_given, const 
   if (verdict.state == State::good) return sentence;
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
-  // Beside what only says how bad it is, what it may come from.
+  // Adds a likely cause to checks that only state the extent.
   constexpr std::array<std::string_view, 12> names{"frozen", "encoder", "other object",  "bounces", "jitter", "times",
                                                    "clocks", "mistake", "second target", "falls",   "rig",    "lean"};
   const auto cause = std::ranges::find_if(
@@ -286,7 +286,7 @@ std::string sentence_of(const TrackReport& report, std::size_t num_given, const 
   return sentence;
 }
 
-/// A rig that is wrong also makes a target look as one that falls: what explains more of the likelihood is named first.
+/// A wrong rig can also look like a falling target: the one that explains more of the likelihood is named first.
 void put_likelier_first(Verdict& verdict) {
   const auto falls = std::ranges::find(verdict.checks, "falls", &Check::name);
   const auto rig = std::ranges::find(verdict.checks, "rig", &Check::name);
@@ -294,7 +294,7 @@ void put_likelier_first(Verdict& verdict) {
   if (0.5 * rig->value * rig->value > falls->value) std::rotate(falls, falls + 1, verdict.checks.end());
 }
 
-/// What was followed, without the rows that were kept out.
+/// The report and observations of what was followed, without the excluded rows.
 struct Followed {
   TrackReport report;
   Observations observations;
@@ -315,7 +315,7 @@ void add_frozen(const TrackReport& report, std::span<const RigHead> heads, Verdi
                                    static_cast<double>(one.num), 0.0, "rows"));
 }
 
-/// What to do about the first that the others contradict.
+/// What to do about the first frozen rows that the others contradict.
 void set_frozen_remedy(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
   const auto first = std::ranges::find(report.frozen, false, &FrozenRows::agrees);
   if (first != report.frozen.end()) verdict.to_add = frozen_remedy(*first, heads);
@@ -325,7 +325,7 @@ Verdict verdict_of(const TrackReport& report, std::span<const TargetObservation>
                    std::span<const RigHead> heads, const FollowConfig& config, bool is_stated, std::size_t num_given) {
   if (auto copied = copied_pixels(observations, heads)) return refused(std::move(*copied));
   if (auto other = other_camera(report, observations, heads)) {
-    const auto misread = explanation_of(observations, heads, config, /*fits=*/false);  // of larger images, or exchanged
+    const auto misread = explanation_of(observations, heads, config, /*fits=*/false);  // larger images, or exchanged
     return refused(misread ? *misread : std::move(*other));
   }
   if (const auto unit = units_of_heads_times(observations, heads, config)) return refused({unit->text, unit_remedy});

@@ -12,11 +12,11 @@
 namespace alidade {
 namespace {
 
-/// A kind of parameter, by how its name goes on or ends, and an error of it that is easily made.
+/// A kind of parameter, identified by a part of its name, and a common size of its error.
 struct Kind {
   const char* part;
-  double error;   ///< In the parameter's unit.
-  bool is_share;  ///< … or of its value.
+  double error;   ///< In the unit of the parameter,
+  bool is_share;  ///< or relative to its value.
   const char* text;
 };
 constexpr std::array<Kind, 6> kinds{Kind{"_rad", 0.0017453292519943295, false, "0.1°"},
@@ -32,7 +32,7 @@ const Kind* kind_of(const std::string& name) {
   return kind == kinds.end() ? nullptr : kind;
 }
 
-/// A position of the track, and how it depends on the heads' parameters.
+/// A position of the track, and its sensitivity to the parameters of the heads.
 struct Place {
   const TrackStep* step = nullptr;
   double range_m = 0.0;
@@ -44,7 +44,7 @@ struct Place {
   }
 };
 
-/// Some positions from all of the track, the one of the median range last.
+/// Positions sampled over the whole track; the last one has the median range.
 std::vector<Place> places_of(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                              const TrackReport& report) {
   constexpr std::size_t max_places = 41;
@@ -76,14 +76,14 @@ double rms_share(std::span<const Place> places, const RigPower& of) {
   return std::sqrt(sum / static_cast<double>(places.size()));
 }
 
-/// Whether it may be off by so much that the target is 5σ off, and be named in half of such logs at most.
+/// Whether an error may displace the target by 5σ while at most half of such logs reveal it.
 bool is_unseen(const RigPower& of, const Place& median, double max_z) {
   constexpr double silent_sigma = 5.0;
   const double shown = of.z_per_unit > 0.0 ? max_z / of.z_per_unit : std::numeric_limits<double>::infinity();
   return std::min(shown, of.largest) * in_sigma(median.moved(of), *median.step) > silent_sigma;
 }
 
-/// What the rig file lets the unseen parameters move at that place.
+/// σ of the displacement at that position by the unseen parameters, according to the rig file.
 Eigen::Vector3d sigma_moved(const UnseenErrors& unseen, const Place& at, const RigUncertainty& errors) {
   Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(3, errors.num());
   for (std::size_t h = 0; h < errors.factor.size() && h < at.by.size(); ++h) {
@@ -96,7 +96,7 @@ Eigen::Vector3d sigma_moved(const UnseenErrors& unseen, const Place& at, const R
   return moved.rowwise().norm();
 }
 
-/// "pan_zero_rad and camera.cx of heads 1, 2; camera.f of head 2": names by the heads that they are of.
+/// "pan_zero_rad and camera.cx of heads 1, 2; camera.f of head 2": names grouped by heads.
 std::string names_text(const UnseenErrors& unseen) {
   std::vector<std::pair<std::string, std::string>> of_names;  // name, heads
   for (const RigPower* one : unseen.params) {

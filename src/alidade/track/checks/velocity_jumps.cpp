@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// Position, velocity and their covariance of a target that nothing but gravity moves, so much later or earlier.
+/// Position, velocity and their covariance of a target that is moved only by gravity, at `dt_s` later or earlier.
 Belief<6> continued(const Belief<6>& belief, double dt_s, const Eigen::Vector3d& gravity_m_s2) {
   Eigen::Matrix<double, 6, 6> F = Eigen::Matrix<double, 6, 6>::Identity();
   F.topRightCorner<3, 3>().diagonal().setConstant(dt_s);
@@ -18,7 +18,7 @@ Belief<6> continued(const Belief<6>& belief, double dt_s, const Eigen::Vector3d&
   return result;
 }
 
-/// The last step that was used before the track began again at `restart`, and one so long after it that the velocity is
+/// The last accepted step before the track restarted at `restart`, and the first one after which the velocity is
 /// known.
 struct Sides {
   const TrackStep *before = nullptr, *after = nullptr;
@@ -41,14 +41,14 @@ struct Jump {
   double t_s = 0.0, by_m_s = 0.0;
 };
 
-/// The two paths at one time: how far they are apart, with its covariance.
+/// The difference of the two paths at one time, with its covariance.
 Belief<6> apart_at(const Sides& sides, double t_s, const Eigen::Vector3d& gravity_m_s2) {
   const Belief<6> before = continued(sides.before->belief, t_s - sides.before->t_s, gravity_m_s2);
   const Belief<6> after = continued(sides.after->belief, t_s - sides.after->t_s, gravity_m_s2);
   return {after.x - before.x, before.P + after.P};
 }
 
-/// Where the two paths meet nearest, in σ of both; none where they do not meet, or with the same velocity.
+/// The closest approach of the two paths, in σ of both; none if they do not meet, or meet with the same velocity.
 std::optional<Jump> jump_between(const Sides& sides, const Eigen::Vector3d& gravity_m_s2) {
   constexpr int num_steps = 10;
   constexpr double chi2_3_at_999 = 16.27, min_sigma = 4.0;

@@ -16,7 +16,7 @@ ImuReading between(const ImuReading& a, const ImuReading& b, double t_s) {
           (1.0 - share) * a.force_m_s2 + share * b.force_m_s2};
 }
 
-/// From one reading to the next, by the mean of both: the rotation at half of the way carries the force.
+/// Integrates from one reading to the next, with the mean of both: the force is rotated by half of the rotation.
 void integrate(const ImuReading& a, const ImuReading& b, const Eigen::Vector3d& rate_bias,
                const Eigen::Vector3d& force_bias, ImuStep& step) {
   const double h = b.t_s - a.t_s;

@@ -29,13 +29,13 @@ struct ImuStep {
                   position_by_time = Eigen::Vector3d::Zero();
 };
 
-/// None if the readings do not extend from the first time to the second, or have a gap longer than `max_gap_s`. Rate
-/// and force are linear between readings. `rate_bias` and `force_bias` are subtracted.
+/// Empty if the readings do not extend from the first time to the second, or have a gap longer than `max_gap_s`. Rate
+/// and force are interpolated linearly between readings. `rate_bias` and `force_bias` are subtracted.
 [[nodiscard]] std::optional<ImuStep> preintegrated(std::span<const ImuReading> readings, double from_s, double to_s,
                                                    double max_gap_s, const Eigen::Vector3d& rate_bias,
                                                    const Eigen::Vector3d& force_bias);
 
-/// The reading at a time, interpolated between the two around it. None before the first and after the last.
+/// The reading at a time, interpolated between the two around it. Empty before the first and after the last.
 [[nodiscard]] std::optional<ImuReading> reading_at(std::span<const ImuReading> readings, double t_s);
 
 /// Median of the times between readings; 0: fewer than two readings.

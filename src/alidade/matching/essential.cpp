@@ -77,10 +77,10 @@ Eigen::Matrix<double, 10, 20> constraints(const Entries& E) {
   return rows;
 }
 
-/// Four matrices of which E is a sum, as columns (rows of E one after the other); none of what is not finite.
+/// Four 3 × 3 matrices that span the solutions E, as columns (entries row by row). Empty if the input is not finite.
 std::optional<Eigen::Matrix<double, 9, 4>> null_space(std::span<const Eigen::Vector2d, 5> first,
                                                       std::span<const Eigen::Vector2d, 5> second) {
-  Eigen::Matrix<double, 9, 5> products;  // one column a pair
+  Eigen::Matrix<double, 9, 5> products;  // one column per pair
   for (std::size_t i = 0; i < 5; ++i) {
     const Eigen::Vector3d a = second[i].homogeneous(), b = first[i].homogeneous();
     for (int r = 0; r < 3; ++r) products.block<3, 1>(3 * r, static_cast<int>(i)) = a(r) * b;
@@ -89,7 +89,7 @@ std::optional<Eigen::Matrix<double, 9, 4>> null_space(std::span<const Eigen::Vec
   return orthonormal_basis(products, 9).rightCols<4>();
 }
 
-/// Multiplies the quadratic monomials by x, modulo the constraints: its eigenvectors are their values at the solutions.
+/// Multiplication of the quadratic monomials by x, modulo the constraints; eigenvectors: their values at the solutions.
 std::optional<Eigen::Matrix<double, 10, 10>> action_matrix(const Eigen::Matrix<double, 10, 20>& rows) {
   const Eigen::PartialPivLU<Eigen::Matrix<double, 10, 10>> cubic(rows.leftCols<10>());
   const Eigen::Matrix<double, 10, 10> reduced = cubic.solve(rows.rightCols<10>());
@@ -118,7 +118,7 @@ std::vector<Eigen::Matrix3d> five_point_essentials(std::span<const Eigen::Vector
   const auto vectors = eigen.eigenvectors();
   for (int k = 0; k < 10; ++k) {
     if (values(k).imag() != 0.0) continue;
-    const Eigen::Vector4d weights = vectors.col(k).tail<4>().real();  // x, y, z, 1, times a factor
+    const Eigen::Vector4d weights = vectors.col(k).tail<4>().real();  // x, y, z, 1, up to a factor
     const Eigen::Matrix<double, 9, 1> entries = *basis * weights.normalized();
     if (!entries.allFinite()) continue;
     solutions.emplace_back(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(entries.data()));
@@ -154,7 +154,7 @@ std::array<std::size_t, 5> five_of(std::size_t size, std::mt19937& random) {
   return chosen;
 }
 
-/// Draws after which one of pairs that all agree has been seen with that probability.
+/// Number of draws until a sample of inliers only has been drawn with that probability.
 double enough_draws(double share, double confidence) {
   const double all_agree = std::pow(share, 5);
   return all_agree >= 1.0 ? 1.0 : std::log(1.0 - confidence) / std::log1p(-all_agree);

@@ -8,10 +8,10 @@
 
 namespace alidade {
 
-/// The up to ten essential matrices E (norm 1, sign arbitrary), (x₂; 1)ᵀ E (x₁; 1) = 0, for five points that two
-/// cameras see (x/z, y/z of their rays, in each camera's frame). H. Stewénius, C. Engels and D. Nistér, "Recent
-/// developments on direct relative orientation", ISPRS Journal 60(4), 2006, section 3.2: the eigenvectors of an action
-/// matrix. Empty if the points do not determine them: on one ray, or not finite.
+/// The up to ten essential matrices E (norm 1, sign arbitrary) with (x₂; 1)ᵀ E (x₁; 1) = 0 for five points observed by
+/// two cameras (x/z, y/z of their rays, in each camera's frame). H. Stewénius, C. Engels and D. Nistér, "Recent
+/// developments on direct relative orientation", ISPRS Journal 60(4), 2006, section 3.2: from the eigenvectors of an
+/// action matrix. Empty if the points do not determine them: on one ray, or not finite.
 [[nodiscard]] std::vector<Eigen::Matrix3d> five_point_essentials(std::span<const Eigen::Vector2d, 5> first,
                                                                  std::span<const Eigen::Vector2d, 5> second);
 
@@ -30,8 +30,8 @@ struct EssentialSearch {
   double confidence = 0.99;     ///< Stop when a sample of inliers only was drawn with this probability.
   std::size_t max_draws = 300;  ///< Samples of five pairs each, at most.
 };
-/// RANSAC (Fischler & Bolles, 1981), with the same draws in every call. None for fewer than five pairs, or if no sample
-/// determines a matrix.
+/// RANSAC (Fischler & Bolles, 1981), with the same draws in every call. Empty for fewer than five pairs, or if no
+/// sample determines a matrix.
 [[nodiscard]] std::optional<AgreeingEssential> agreeing_essential(std::span<const Eigen::Vector2d> first,
                                                                   std::span<const Eigen::Vector2d> second,
                                                                   const EssentialSearch& search);

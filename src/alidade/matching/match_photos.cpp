@@ -16,7 +16,7 @@ using Size = std::pair<int, int>;
 
 std::string words(const Size& size) { return std::to_string(size.first) + "x" + std::to_string(size.second); }
 
-/// The size of most photos; of two that are as frequent the first.
+/// The most frequent size of the photos; among equally frequent ones, that of the first photo.
 Size usual_size(const std::vector<Size>& sizes) {
   std::map<Size, int> count;
   Size usual;

@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-/// 8-bit grey, at most so large; `shrunk` is its size over the photo's.
+/// 8-bit grey image of at most `max_megapixels`; `shrunk` is its size over the photo's.
 cv::Mat small_grey(const cv::Mat& photo, double max_megapixels, double& shrunk) {
   std::string reason;
   cv::Mat grey = to_grey_photo(photo, reason);
@@ -26,7 +26,7 @@ cv::Mat small_grey(const cv::Mat& photo, double max_megapixels, double& shrunk) 
   return grey;
 }
 
-/// The strongest of each cell, one per position.
+/// The strongest in each cell of a grid, one per position.
 std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> found, const cv::Size& size, int most) {
   constexpr int columns = 8, rows = 6;
   std::stable_sort(found.begin(), found.end(),
@@ -46,8 +46,8 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> found, const cv::Size
   return kept;
 }
 
-/// By how much OpenCV's SIFT reads a position too large: it doubles the image about the pixels' outer borders, and
-/// halves the positions found there about the centre of the first pixel.
+/// Offset of positions from OpenCV's SIFT, which are too large by this: it doubles the image about the outer borders of
+/// the pixels, and halves the positions found there about the centre of the first pixel.
 constexpr double sift_shift_px = 0.25;
 
 }  // namespace
@@ -100,7 +100,7 @@ std::vector<FeatureMatch> match_features(const Descriptors& a, const Descriptors
           second = value;
         }
       }
-      // of unit vectors: distance² = 2 − 2 likeness
+      // for unit vectors: distance² = 2 − 2 · similarity
       const double nearest = std::max(2.0 - 2.0 * best, 0.0), next = std::max(2.0 - 2.0 * second, 0.0);
       if (nearest < ratio * ratio * next) nearest_of_a[static_cast<std::size_t>(first + i)] = at;
     }

@@ -10,9 +10,9 @@
 namespace alidade {
 namespace {
 
-/// Weights of six neighbours at the position t in [0, 1) between the central two: Lagrange's polynomial of degree 5.
-/// Cubic convolution errs by 0.006 px RMS on fine grains, as much as noise of σ = 1.5 grey values; this by less than
-/// 0.003.
+/// Weights of six neighbours for the position t in [0, 1) between the central two: Lagrange polynomial of degree 5.
+/// Cubic convolution has an error of 0.006 px RMS on fine textures, as much as noise of σ = 1.5 grey values; this one
+/// less than 0.003.
 std::array<float, 6> weights_at(float t) {
   const float a = t + 2.0f, b = t + 1.0f, c = t, d = t - 1.0f, e = t - 2.0f, f = t - 3.0f;
   const float ab = a * b, cd = c * d, ef = e * f;
@@ -22,7 +22,7 @@ std::array<float, 6> weights_at(float t) {
 
 constexpr int before_px = 2, after_px = 3;  // neighbours that a sample needs
 
-/// Samples an image between its pixels.
+/// Interpolates an image at a subpixel position.
 float sample(const cv::Mat& image, const Eigen::Vector2d& at) {
   const int u = static_cast<int>(at.x()), v = static_cast<int>(at.y());  // inside: never negative
   const std::array<float, 6> wx = weights_at(static_cast<float>(at.x() - u)),
@@ -44,7 +44,7 @@ bool is_inside(const cv::Mat& image, const PatchPose& pose, double half_px) {
          high.x() < image.cols - after_px && high.y() < image.rows - after_px;
 }
 
-/// Moves a pose against a step in the patch's own frame: position, linear part by rows, gain, bias.
+/// Composes a pose with the inverse of a step in the patch's own frame: position, linear part by rows, gain, bias.
 void compose(PatchPose& pose, const Eigen::Matrix<double, 8, 1>& step) {
   Eigen::Matrix2d stretch;
   stretch << 1.0 + step[2], step[3], step[4], 1.0 + step[5];
@@ -62,7 +62,7 @@ AnchorPatch::AnchorPatch(const cv::Mat& smoothed, int u, int v) : grey_(area_px)
     const int du = i % side_px - half_px, dv = i / side_px - half_px;
     const float* at = smoothed.ptr<float>(v + dv) + u + du;
     const float here = *at;
-    // Fourth order: the second-order difference is too small on fine grains, and the first step too long.
+    // Fourth order: a second-order difference underestimates gradients of fine textures; the first step is too long.
     const float gx = (8.0f * (at[1] - at[-1]) - (at[2] - at[-2])) / 12.0f;
     const auto row = [&](int dy) { return smoothed.ptr<float>(v + dv + dy)[u + du]; };
     const float gy = (8.0f * (row(1) - row(-1)) - (row(2) - row(-2))) / 12.0f;
@@ -77,8 +77,8 @@ AnchorPatch::AnchorPatch(const cv::Mat& smoothed, int u, int v) : grey_(area_px)
   set_noise_model();
 }
 
-/// White noise that was smoothed is alike at neighbouring pixels: the covariance of J' r is J' C J with C the
-/// smoothing's autocorrelation, [1 4 6 4 1]/16 along each axis.
+/// Smoothed white noise is correlated between neighbouring pixels: the covariance of J' r is J' C J with C the
+/// autocorrelation of the smoothing kernel, [1 4 6 4 1]/16 along each axis.
 void AnchorPatch::set_noise_model() {
   using Matrix = Eigen::Matrix<double, num_unknowns, num_unknowns>;
   const Matrix normal = (jacobian_ * jacobian_.transpose()).cast<double>();
@@ -95,15 +95,15 @@ void AnchorPatch::set_noise_model() {
   const Matrix inner = (jacobian_ * correlated.transpose()).cast<double>();
   const Matrix cov = inverse_ * inner * inverse_;
   cov_unit_ = cov.topLeftCorner<2, 2>();
-  constexpr double variance_kept = 36.0 / 256.0;  // of white noise, by the smoothing of both axes
-  constexpr double after_sampling = 0.980;        // of that, by interpolation, mean over subpixel positions
+  constexpr double variance_kept = 36.0 / 256.0;  // of white noise, by smoothing along both axes
+  constexpr double after_sampling = 0.980;        // of that, by interpolation; mean over subpixel positions
   const double squares = variance_kept * area_px - (inverse_ * inner).trace();
   rms_unit_ = std::sqrt((1.0 + after_sampling) * std::max(squares, 1e-9) / area_px);
 }
 
 PatchFit AnchorPatch::align(const cv::Mat& smoothed, const PatchPose& start) const {
   constexpr int max_iterations = 15;
-  constexpr double small_step_px = 0.002;  // a twentieth of the noise, at most
+  constexpr double small_step_px = 0.002;  // at most a twentieth of the noise
   PatchFit fit{.pose = start};
   Eigen::VectorXf residual(area_px);
   for (int iteration = 0; iteration < max_iterations && !fit.converged; ++iteration) {

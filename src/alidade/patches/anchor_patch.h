@@ -11,41 +11,41 @@ class Mat;
 
 namespace alidade {
 
-/// A patch's position in an image, and how it has been rotated, stretched and curved since it was cut out: a point at
-/// offset d from its centre is seen at px + linear d + ½ bend (d_x², 2 d_x d_y, d_y²), with grey values gain · grey +
+/// A patch's position in an image, and its warp since it was cut out: a point at offset d from its
+/// centre is seen at px + linear d + ½ bend (d_x², 2 d_x d_y, d_y²), with grey values gain · grey +
 /// bias.
 struct PatchPose {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d linear = Eigen::Matrix2d::Identity();
-  WarpBend bend = WarpBend::Zero();  ///< Given: a patch alone separates curvature and position poorly.
+  WarpBend bend = WarpBend::Zero();  ///< Given, not estimated: a patch hardly separates curvature from position.
   double gain = 1.0, bias = 0.0;
 };
 
-/// A patch found again.
+/// Result of aligning a patch.
 struct PatchFit {
   PatchPose pose;
   double rms = 0.0;  ///< Of the residuals, in grey values of the patch.
   bool converged = false;
-  Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< Of px, by this frame's noise alone. [px²]
+  Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< Of px, from the noise of this frame only. [px²]
 };
 
-/// A square of pixels of one image that is found again in others by an affine warp with gain and bias, to a few
-/// hundredths of a pixel: inverse-compositional Gauss–Newton, so that the derivatives are the patch's own and are taken
-/// once. S. Baker & I. Matthews, "Lucas–Kanade 20 years on", 2004.
+/// A square patch of one image that is located in others by an affine warp with gain and bias, to a few hundredths of a
+/// pixel: inverse-compositional Gauss–Newton, whose derivatives are those of the patch and are computed once. S. Baker
+/// & I. Matthews, "Lucas–Kanade 20 years on", 2004.
 ///
-/// Images are 32-bit float, smoothed by smoothed_for_patches(): interpolation then leaves hardly an error that
-/// depends on the subpixel position.
+/// Images are 32-bit float, smoothed by smoothed_for_patches(): then interpolation causes hardly any error that depends
+/// on the subpixel position.
 class AnchorPatch {
  public:
   static constexpr int half_px = 7;
-  /// Pixels around `px` that have to be in the image.
+  /// Pixels required around `px` in the image.
   static constexpr int margin_px = half_px + 3;
 
   AnchorPatch() = default;
   /// Cuts out the patch around a whole pixel, `margin_px` inside the image.
   AnchorPatch(const cv::Mat& smoothed, int u, int v);
 
-  /// Finds it from a pose at most about 2 px off. Not converged: it is not there, or partly outside.
+  /// Locates it from a pose that is off by about 2 px at most. Not converged: it is not there, or partly outside.
   [[nodiscard]] PatchFit align(const cv::Mat& smoothed, const PatchPose& start) const;
 
   /// Covariance of the position [px²] for noise of σ = 1 grey value in the unsmoothed image.

@@ -16,11 +16,11 @@ bool is_taken(const Eigen::Vector2d& px, std::span<const Eigen::Vector2d> near, 
       near, [&](const Eigen::Vector2d& at) { return (at - px).squaredNorm() < min_distance_px * min_distance_px; });
 }
 
-/// The best pixel of a cell that is not beside one of `near`.
+/// The best pixel of a cell that is not close to one of `near`.
 std::optional<CornerFeature> best_in(const cv::Mat& grey, const cv::Rect& cell, std::span<const Eigen::Vector2d> near,
                                      const CornerFeatureConfig& config) {
   cv::Mat eigenvalue;
-  cv::cornerMinEigenVal(grey(cell), eigenvalue, block_px, 3);  // looks over the cell's edge, scaled to 8 bits and area
+  cv::cornerMinEigenVal(grey(cell), eigenvalue, block_px, 3);  // reads beyond the cell; scaled to 8 bits and area
   CornerFeature best;
   float largest = 0.0f;
   for (int row = 0; row < cell.height; ++row) {

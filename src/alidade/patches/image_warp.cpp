@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t min_points = 20;  // twice the terms
+constexpr std::size_t min_points = 20;  // twice the number of terms
 
 }  // namespace
 
@@ -50,7 +50,7 @@ bool ImageWarp::solve(std::span<const PointMove> moves, double max_residual_px) 
     ++used;
   }
   const Ldlt factors(normal);
-  // Points on a curve of third order leave the cubic open: 10⁻⁸ of the largest pivot is a curve.
+  // Points on a cubic curve do not determine the polynomial: pivots below 10⁻⁸ of the largest indicate this.
   const bool is_open = factors.pivots().minCoeff() < 1e-8 * factors.pivots().maxCoeff();
   if (used < min_points || is_open) return false;
   coefficients_ = factors.solve_each(right);

@@ -9,16 +9,16 @@ namespace alidade {
 /// Second derivatives of a map of the plane: ∂²/∂x², ∂²/∂x∂y, ∂²/∂y² in the columns. [1/px]
 using WarpBend = Eigen::Matrix<double, 2, 3>;
 
-/// Where a point went from one frame to another.
+/// Positions of a point in two frames.
 struct PointMove {
   Eigen::Vector2d from_px, to_px;
 };
 
-/// A smooth map of a whole image onto another, a cubic polynomial through many moved points: how the perspective of a
-/// rotation, and the lens, curve what is seen. A far world needs no more, with any lens.
+/// A smooth map of one whole image to another: a cubic polynomial fitted to many moved points. Models the curvature by
+/// perspective under rotation, and by the lens. For a distant scene this suffices with any lens.
 class ImageWarp {
  public:
-  /// None for too few points. Points that moved differently from the rest are rejected.
+  /// Empty for too few points. Points that moved differently from the rest are rejected.
   [[nodiscard]] static std::optional<ImageWarp> fit(std::span<const PointMove> moves);
 
   [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& px) const;

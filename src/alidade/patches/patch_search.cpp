@@ -12,7 +12,7 @@ namespace {
 
 constexpr int half = PatchView::half_px, side = PatchView::side_px, row_px = PatchView::row_px;
 
-/// Σ template · image with the patch's top-left at `image`. Reads row_px a row: the last ones count as zero.
+/// Σ template · image with the patch's top-left at `image`. Reads row_px pixels per row: the last ones count as zero.
 ALIDADE_VECTOR_CLONES int product_at(const std::int16_t* grey, const std::uint8_t* image, std::size_t stride) {
   int sum = 0;
   for (int row = 0; row < side; ++row) {
@@ -23,7 +23,7 @@ ALIDADE_VECTOR_CLONES int product_at(const std::int16_t* grey, const std::uint8_
   return sum;
 }
 
-/// Positions to evaluate: whole pixels about the expected one, so far inside that rows of row_px can be read.
+/// Positions to evaluate: whole pixels around the expected one, far enough inside to read rows of row_px pixels.
 struct SearchWindow {
   int u_min = 0, u_max = -1, v_min = 0, v_max = -1;
 };
@@ -34,21 +34,21 @@ SearchWindow window_of(const cv::Mat& image, const Eigen::Vector2d& centre, cons
   const double reach_v = std::min(search.num_sigma * std::sqrt(S(1, 1)), search.max_half_px);
   const auto lower = [](double value, int least) { return std::max(static_cast<int>(std::ceil(value)), least); };
   const auto upper = [](double value, int most) { return std::min(static_cast<int>(std::floor(value)), most); };
-  // One more pixel than the patch, for the fit between pixels.
+  // One more pixel than the patch, for the subpixel fit.
   return {lower(centre.x() - reach_u, half + 1), upper(centre.x() + reach_u, image.cols - row_px + half - 1),
           lower(centre.y() - reach_v, half + 1), upper(centre.y() + reach_v, image.rows - half - 2)};
 }
 
-/// Sums over the patch's square at every position of one row of the window, moved down row by row.
+/// Sums over the patch's square at every position of one row of the window, updated row by row.
 class BoxSums {
  public:
   BoxSums(const cv::Mat& image, const SearchWindow& window)
       : image_(image), window_(window), width_(window.u_max - window.u_min + side), sum_(size()), squares_(size()) {
     for (int v = window.v_min - half; v < window.v_min + half; ++v) change(v, 1);
   }
-  /// Goes to row v: adds its last row.
+  /// Moves to row v: adds the last row of its square.
   void enter(int v) { change(v + half, 1); }
-  /// Takes its first row out again.
+  /// Removes the first row of its square.
   void leave(int v) { change(v - half, -1); }
   /// n Σ g² − (Σ g)² over the patch at a position, for all positions of the row.
   void spreads(std::vector<float>& out) const {
@@ -82,7 +82,7 @@ class BoxSums {
   std::vector<int> sum_, squares_;
 };
 
-/// The best whole pixel; its correlation is negative where there is none.
+/// The best whole pixel; the correlation is negative if there is none.
 struct BestPlace {
   int u = 0, v = 0, num_compared = 0;
   double correlation = -1.0;
@@ -122,7 +122,7 @@ BestPlace best_place(const cv::Mat& image, const PatchView& view, const Eigen::V
   return best;
 }
 
-/// Grey values of the patch's square at a subpixel position.
+/// Bilinear grey values of the patch's square at a subpixel position.
 void sample(const cv::Mat& image, const Eigen::Vector2d& px, std::array<float, PatchView::area_px>& out) {
   const int u = static_cast<int>(std::floor(px.x())), v = static_cast<int>(std::floor(px.y()));
   const auto a = static_cast<float>(px.x() - u), b = static_cast<float>(px.y() - v);
@@ -140,7 +140,7 @@ bool is_inside(const cv::Mat& image, const Eigen::Vector2d& px) {
   return px.x() >= half && px.y() >= half && px.x() < image.cols - half - 1 && px.y() < image.rows - half - 1;
 }
 
-/// Gauss–Newton from a whole pixel. None where it leaves that pixel's surroundings.
+/// Gauss–Newton from a whole pixel. Empty if it leaves the surroundings of that pixel.
 std::optional<PatchMatch> between_pixels(const cv::Mat& image, const PatchView& view, const BestPlace& from) {
   constexpr int max_iterations = 8;
   constexpr double small_step_px = 0.01, max_px = 1.5;
@@ -171,8 +171,8 @@ std::optional<PatchMatch> between_pixels(const cv::Mat& image, const PatchView& 
     if (!((match.px - start).cwiseAbs().maxCoeff() < max_px)) return std::nullopt;
     if (step.norm() < small_step_px) break;
   }
-  // Noise smoothed by [1 2 1]/4 twice keeps 36/256 of its variance, but at a sixth of a cycle a pixel, where a patch's
-  // derivatives are, 9/16: what is left over counts so much more.
+  // Noise smoothed twice by [1 2 1]/4 keeps 36/256 of its variance, but 9/16 at a sixth of a cycle per pixel, where a
+  // patch's derivatives are: the residuals count that much more.
   constexpr double lost_by_smoothing = 4.0;
   match.sigma_px = std::sqrt(std::max(variance, 0.0) * lost_by_smoothing * 0.5 * inverse.trace());
   return match;

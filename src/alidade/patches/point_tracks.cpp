@@ -19,29 +19,29 @@
 namespace alidade {
 namespace {
 
-constexpr int max_levels = 4;              // flow of up to about 40 px a frame without a guess
-constexpr double max_align_move_px = 1.5;  // beyond it alignment and flow found different things
-constexpr double min_distance_px = 8.0;    // half a patch: closer points contain the same information
+constexpr int max_levels = 4;              // flow of up to about 40 px per frame without a guess
+constexpr double max_align_move_px = 1.5;  // beyond that, alignment and flow found different things
+constexpr double min_distance_px = 8.0;    // half a patch: closer points carry the same information
 constexpr double first_noise = 2.0;        // grey values, until estimated from the frames
 constexpr double min_gain = 0.5, max_gain = 2.0;
 
 struct Track {
   int id = 0;
   AnchorPatch patch;
-  Eigen::Vector2d offset = Eigen::Vector2d::Zero();     ///< Of the point from the centre of its patch, in the patch.
+  Eigen::Vector2d offset = Eigen::Vector2d::Zero();     ///< Of the point from its patch's centre, in the patch.
   PatchPose pose;                                       ///< Of the patch in the last frame.
-  Eigen::Vector2d anchor_px = Eigen::Vector2d::Zero();  ///< Where the patch was cut out, in frame `anchor_frame`.
+  Eigen::Vector2d anchor_px = Eigen::Vector2d::Zero();  ///< Where the patch was cut out, in `anchor_frame`.
   std::size_t anchor_frame = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  Eigen::Vector2d flow_px = Eigen::Vector2d::Zero();  ///< Since the frame before.
+  Eigen::Vector2d flow_px = Eigen::Vector2d::Zero();  ///< Since the previous frame.
   double sigma_px = 0.0;
-  double noise = first_noise;  ///< As this patch saw it: σ in grey values of the unsmoothed image.
+  double noise = first_noise;  ///< Estimate from this patch: σ in grey values of the unsmoothed image.
   bool is_lost = false;
 };
 
 double sigma_of(const Eigen::Matrix2d& cov) { return std::sqrt(0.5 * cov.trace()); }
 
-/// How much longer the longest or shorter the shortest direction has become.
+/// Largest ratio by which a direction was lengthened or shortened.
 double stretch_of(const Eigen::Matrix2d& linear) {
   const Eigen::Vector2d lengths = svd_of(linear).values;
   return std::max(lengths[0], 1.0 / lengths[1]);
@@ -52,7 +52,7 @@ bool has_room(const cv::Mat& image, const Eigen::Vector2d& px) {
   return px.x() >= margin && px.y() >= margin && px.x() <= image.cols - 1 - margin && px.y() <= image.rows - 1 - margin;
 }
 
-/// Cuts the track's patch out of this image, around the whole pixel next to the point.
+/// Cuts the track's patch out of this image, around the whole pixel nearest to the point.
 bool set_anchor(Track& track, const cv::Mat& smoothed, std::size_t frame) {
   const Eigen::Vector2d centre = track.px.array().round();
   if (!has_room(smoothed, centre)) return false;
@@ -64,7 +64,7 @@ bool set_anchor(Track& track, const cv::Mat& smoothed, std::size_t frame) {
   return true;
 }
 
-/// Cells of about equal sides, as many as tracks are wanted.
+/// A grid of roughly square cells, as many as the desired number of tracks.
 struct Grid {
   int cols, rows;
   double cell_w, cell_h;
@@ -108,7 +108,7 @@ class PointTracker::Impl {
   }
 
  private:
-  /// How each patch is curved by the perspective of the rotation since it was cut out: from all points seen
+  /// Predicts the curvature of each patch by perspective under the rotation since it was cut out, from all points seen
   /// then and in the previous frame.
   void predict_bends() {
     std::vector<PointMove> moves;
@@ -125,7 +125,7 @@ class PointTracker::Impl {
     }
   }
 
-  /// Keeps where all points are in this frame if a patch was cut out of it, until the last such patch is gone.
+  /// Stores all points of this frame if a patch was cut out of it, until the last such patch is gone.
   void note_places() {
     const auto is_used = [&](std::size_t frame) {
       return std::ranges::any_of(tracks_, [&](const Track& track) { return track.anchor_frame == frame; });
@@ -165,7 +165,7 @@ class PointTracker::Impl {
            fit.pose.gain < max_gain;
   }
 
-  /// Of two that have run together the younger goes.
+  /// If two tracks have converged to one point, the younger one is dropped.
   void drop_doubles() {
     for (std::size_t i = 0; i < tracks_.size(); ++i)
       for (std::size_t j = 0; j < i && !tracks_[i].is_lost; ++j)
@@ -182,7 +182,7 @@ class PointTracker::Impl {
     noise_ = median_of(std::move(all));
   }
 
-  /// New points in the cells that have none: the sharpest corner of each. J. Shi & C. Tomasi, "Good features to track",
+  /// Adds points in empty cells: the sharpest corner of each. J. Shi & C. Tomasi, "Good features to track",
   /// 1994.
   void replenish(const cv::Mat& smoothed) {
     const Grid grid(smoothed, config_.max_tracks);
@@ -190,7 +190,7 @@ class PointTracker::Impl {
     for (const Track& track : tracks_) is_taken[grid.cell_of(track.px)] = 1;
     const auto num_free = std::count(is_taken.begin(), is_taken.end(), 0);
     const auto room = config_.max_tracks - static_cast<std::ptrdiff_t>(tracks_.size());
-    // Cells without corners stay free for ever: searching each frame would find no more.
+    // Cells without corners stay empty: searching them in every frame would be wasted.
     const bool is_due = frames_since_search_ >= 5 || num_free > last_free_ + 5;
     ++frames_since_search_;
     if (room <= 0 || num_free == 0 || !is_due) return;
@@ -204,7 +204,7 @@ class PointTracker::Impl {
     last_free_ = std::count(is_taken.begin(), is_taken.end(), 0);
   }
 
-  /// One per free cell, by cells.
+  /// One per empty cell, in order of cells.
   [[nodiscard]] static std::vector<Eigen::Vector2i> best_corners(const cv::Mat& smoothed, const Grid& grid,
                                                                  const std::vector<char>& is_taken) {
     constexpr int block_px = 7, margin = AnchorPatch::margin_px;
@@ -239,8 +239,8 @@ class PointTracker::Impl {
   }
 
   PointTrackerConfig config_;
-  std::vector<cv::Mat> levels_;                                                 ///< Of the frame before.
-  std::vector<Track> tracks_;                                                   ///< By id.
+  std::vector<cv::Mat> levels_;                                                 ///< Of the previous frame.
+  std::vector<Track> tracks_;                                                   ///< In order of ids.
   std::map<std::size_t, std::vector<std::pair<int, Eigen::Vector2d>>> places_;  ///< By frame, then by id.
   std::vector<TrackedPoint> seen_;
   std::size_t frame_ = 0;

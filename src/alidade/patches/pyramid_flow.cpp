@@ -11,7 +11,7 @@ namespace {
 constexpr int half_px = 5, side_px = 2 * half_px + 1;
 constexpr std::size_t area_px = side_px * side_px;
 
-/// Bilinear patch of side n around a point, with all its pixels inside the image, or nothing.
+/// Cuts a bilinear patch of side n around a point. False unless all its pixels are inside the image.
 template <int n>
 bool cut_patch(const cv::Mat& image, const Eigen::Vector2d& px,
                std::array<float, static_cast<std::size_t>(n* n)>& patch) {
@@ -37,7 +37,7 @@ struct FlowPatch {
   std::array<float, area_px> grey, gx, gy;
   Eigen::Matrix2f inverse;
 
-  /// False: outside, or without structure.
+  /// False: outside, or without texture.
   bool cut(const cv::Mat& image, const Eigen::Vector2d& px) {
     constexpr int wide = side_px + 2;
     std::array<float, static_cast<std::size_t>(wide * wide)> around;
@@ -58,7 +58,7 @@ struct FlowPatch {
   }
 };
 
-/// Gauss–Newton at one level; false where it leaves the image.
+/// Gauss–Newton at one level; false if it leaves the image.
 bool refine(const FlowPatch& patch, const cv::Mat& image, Eigen::Vector2d& px) {
   constexpr int max_iterations = 12;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -100,7 +100,7 @@ std::optional<Eigen::Vector2d> find_shifted(const std::vector<cv::Mat>& from, co
     const auto l = static_cast<std::size_t>(level);
     const bool has_found = patch.cut(from[l], px * scale) && refine(patch, to[l], at);
     if (!has_found && level == 0) return std::nullopt;
-    if (has_found) found = at / scale;  // a coarse level may lack room at the edge, or structure
+    if (has_found) found = at / scale;  // a coarse level may lack room at the border, or texture
   }
   return found;
 }

@@ -8,18 +8,18 @@
 namespace alidade {
 namespace {
 
-constexpr double min_scale = 0.5, max_scale = 2.0;  // beyond, the two images hardly show the same
+constexpr double min_scale = 0.5, max_scale = 2.0;  // beyond that, the two images hardly show the same
 constexpr double min_patch_contrast = 3.0;          // σ of the grey values; less is noise
 
 bool is_usable(const Eigen::Matrix2d& warp) {
   if (!warp.allFinite() || !(warp.determinant() > 0.0)) return false;
-  // Singular values of a 2×2: mean and difference of the two circles that it is made of.
+  // Singular values of a 2×2 matrix: sum and difference of its two conformal parts, halved.
   const double sum = std::hypot(warp(0, 0) + warp(1, 1), warp(1, 0) - warp(0, 1));
   const double difference = std::hypot(warp(0, 0) - warp(1, 1), warp(1, 0) + warp(0, 1));
   return 0.5 * (sum - difference) > min_scale && 0.5 * (sum + difference) < max_scale;
 }
 
-/// Derivatives without what gain and bias would explain, and their products.
+/// Projects the derivatives orthogonal to gain and bias, and computes their products.
 void finish(PatchView& view) {
   const auto project_out = [&](std::array<float, PatchView::area_px>& values) {
     double sum = 0.0, along = 0.0;
@@ -41,11 +41,11 @@ void finish(PatchView& view) {
   view.shift_information << uu, uv, uv, vv;
 }
 
-/// A pixel more than a view on every side, for its derivatives.
+/// One pixel more than a view on every side, for its derivatives.
 constexpr int wide_half_px = PatchView::half_px + 1, wide_side_px = 2 * wide_half_px + 1;
 using WideView = std::array<float, static_cast<std::size_t>(wide_side_px) * wide_side_px>;
 
-/// The patch seen through a map, between its pixels bilinear.
+/// The patch resampled through a linear map, bilinearly.
 WideView warped(std::span<const std::uint8_t, ReferencePatch::area_px> grey, const Eigen::Matrix2f& first_from_here) {
   constexpr int half = wide_half_px, side = wide_side_px;
   constexpr float last = ReferencePatch::side_px - 1.001f;
@@ -112,7 +112,7 @@ std::optional<PatchView> ReferencePatch::seen_through(const Eigen::Matrix2d& her
 cv::Mat smoothed_for_search(const cv::Mat& grey) {
   cv::Mat bytes, smoothed;
   grey.convertTo(bytes, CV_8U);
-  cv::GaussianBlur(bytes, smoothed, {3, 3}, 0.0, 0.0, cv::BORDER_REPLICATE);  // of 3 is [1 2 1]/4
+  cv::GaussianBlur(bytes, smoothed, {3, 3}, 0.0, 0.0, cv::BORDER_REPLICATE);  // a kernel of 3 is [1 2 1]/4
   return smoothed;
 }
 

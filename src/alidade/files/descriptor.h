@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// An open file that closes itself.
+/// An open file descriptor that is closed on destruction.
 class Descriptor {
  public:
   explicit Descriptor(int number) : number_(number) {}
@@ -19,17 +19,17 @@ class Descriptor {
   }
   [[nodiscard]] int number() const { return number_; }
   [[nodiscard]] bool is_open() const { return number_ >= 0; }
-  /// Closes it now; false where the system only then finds that not all went in (network drives).
+  /// Closes it now; false if the system only then reports that not everything was written (network drives).
   [[nodiscard]] bool close() { return ::close(std::exchange(number_, -1)) == 0; }
 
  private:
   int number_;
 };
 
-/// Throws InputError: "FILE: WHAT: No space left on device", the last by its errno.
+/// Throws InputError: "FILE: WHAT: No space left on device", where the last part follows from errno.
 [[noreturn]] void fail_on(const std::filesystem::path& file, const char* what, int error);
 
-/// All of it, however often the system must be asked. Throws InputError, about `file`, where it does not go in.
+/// Writes all of `content`, in as many calls as needed. Throws InputError about `file` if it cannot be written.
 void write_all(const std::filesystem::path& file, const Descriptor& out, std::string_view content);
 
 }  // namespace alidade

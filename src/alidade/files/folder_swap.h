@@ -10,53 +10,53 @@
 
 namespace alidade {
 
-/// Folders made here, from the outermost; removed again as long as they are empty.
+/// Folders created here, from the outermost; on destruction those that are empty are removed.
 class MadeFolders {
  public:
   MadeFolders() = default;
   MadeFolders(const MadeFolders&) = delete;
   MadeFolders& operator=(const MadeFolders&) = delete;
   ~MadeFolders();
-  /// Makes what is missing of the path. Throws InputError if it cannot be made.
+  /// Creates the missing folders of a path. Throws InputError if one cannot be created.
   void make(const std::filesystem::path& folder);
-  /// What was made and is empty goes.
+  /// Removes the created folders that are empty.
   void remove_empty() noexcept;
-  /// The folders that list what was made.
+  /// The folders that contain the created ones.
   [[nodiscard]] std::vector<std::filesystem::path> parents() const;
 
  private:
-  /// False: `errno` says why not.
+  /// False: `errno` gives the reason.
   [[nodiscard]] bool make_once(const std::filesystem::path& folder);
 
   std::vector<std::filesystem::path> made_;
 };
 
-/// New files of a folder, and old ones that go: all at once, or nothing at all. What is new waits in a hidden folder
-/// inside it (`.alidade-…`: the same disk, so that a rename is enough) until commit(). Without commit(), on a full disk
-/// or after any exception, the folder is as it was, and is not there if it was not. A killed process leaves at worst
-/// the hidden folder; the next FolderSwap there clears it, and undoes, or ends, a commit() that was cut in two. A power
-/// cut does no more: what is new is on the disk before anything older moves, and all of it when commit() returns.
+/// Adds new files to a folder and removes old ones, all at once or not at all. New files are kept in a hidden folder
+/// inside it (`.alidade-…`, on the same disk: renaming suffices) until commit(). Without commit(), on a full disk or
+/// after any exception, the folder is unchanged, or absent if it was. A killed process leaves at most the hidden
+/// folder; the next FolderSwap there removes it and undoes, or completes, an interrupted commit(). A power cut does no
+/// more: new files are on the disk before an older one is moved, and all when commit() returns.
 class FolderSwap {
  public:
-  /// Makes the folder where it is missing, and finds out that it can be written: throws InputError if not.
+  /// Creates the folder if it is missing, and checks that it can be written to: throws InputError if not.
   explicit FolderSwap(std::filesystem::path folder);
   FolderSwap(const FolderSwap&) = delete;
   FolderSwap& operator=(const FolderSwap&) = delete;
 
-  /// A new file, by its name inside the folder, written when this returns. Throws InputError, and leaves
-  /// nothing of it, if it cannot be written.
+  /// Adds a new file, by its name inside the folder; it is written when this returns. If it cannot be written, throws
+  /// InputError, and leaves nothing of it.
   void add(const std::filesystem::path& name, std::string_view content);
-  /// A file that goes, if it is there and nothing new takes its place.
+  /// Removes a file, if it exists and no new file replaces it.
   void remove(const std::filesystem::path& name);
-  /// Moves everything into place; the file that was added first comes last, and its older version is removed first: a
-  /// file that describes the others is never beside the wrong ones. Throws InputError after undoing it all.
+  /// Moves everything into place, the file added first as the last one, with its older version removed first: a file
+  /// that describes the others is never next to the wrong ones. Throws InputError after undoing everything.
   void commit();
 
  private:
   struct Move {
     std::filesystem::path from, to;
   };
-  /// Goes with its owner, also where the owner's constructor throws.
+  /// Removed with its owner, even if the owner's constructor throws.
   struct HiddenFolder {
     std::string path;
     ~HiddenFolder();
@@ -72,7 +72,7 @@ class FolderSwap {
   std::filesystem::path folder_;
   MadeFolders made_;
   std::filesystem::path hidden_;
-  std::optional<Descriptor> lock_;  ///< Of the hidden folder: its owner lives.
+  std::optional<Descriptor> lock_;  ///< Lock of the hidden folder: its owner is alive.
   HiddenFolder hidden_folder_;
   std::vector<std::filesystem::path> added_, removed_;
   std::vector<Move> moves_;

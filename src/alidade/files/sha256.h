@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// SHA-256 as 64 hexadecimal digits: says which input a result was made from. NIST FIPS 180-4.
+/// SHA-256 as 64 hexadecimal digits: identifies the input of a result. NIST FIPS 180-4.
 [[nodiscard]] std::string sha256(std::string_view bytes);
 
 }  // namespace alidade

@@ -7,22 +7,22 @@
 
 namespace alidade {
 
-/// Bytes put aside on disk until they are wanted, in a file without a name: however the program ends, nothing of it
-/// stays.
+/// Bytes stored on disk until they are needed, in a file without a name: nothing of it remains, however the program
+/// ends.
 class Spool {
  public:
-  /// Where something is in it.
+  /// Position and size of an item.
   struct Place {
     std::uint64_t at = 0, size = 0;
   };
 
-  /// On the disk of `folder`, or of the nearest one above it that exists. Throws InputError if that cannot be written.
+  /// Uses the disk of `folder`, or of its nearest existing parent. Throws InputError if that cannot be written to.
   explicit Spool(std::filesystem::path folder);
   Spool(const Spool&) = delete;
   Spool& operator=(const Spool&) = delete;
   ~Spool();
 
-  /// Throws InputError if the disk is full.
+  /// Appends bytes. Throws InputError if the disk is full.
   [[nodiscard]] Place put(std::string_view bytes);
   [[nodiscard]] std::string get(Place place) const;
 

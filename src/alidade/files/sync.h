@@ -7,11 +7,11 @@
 
 namespace alidade {
 
-/// On the disk when this returns: a power cut loses nothing of it. Throws InputError, about `file`, where the disk
-/// fails. A file system that knows no such promise is left to itself.
+/// Flushes a file to the disk, so that a power cut loses nothing of it. Throws InputError about `file` if the disk
+/// fails. File systems without such a guarantee are accepted.
 void sync_file(const std::filesystem::path& file, const Descriptor& open);
 
-/// The same for files and folders (their lists of names), several at a time: the disk takes what waits for it together.
+/// The same for files and folders (their lists of names), several at a time, so that the disk writes them together.
 void sync_all(const std::vector<std::filesystem::path>& paths);
 
 }  // namespace alidade

@@ -7,15 +7,15 @@
 
 namespace alidade {
 
-/// The document of what a head is.
+/// Result document of the survey of a head.
 [[nodiscard]] JobOutcome outcome_of(const HeadSurvey& survey);
-/// Of how it follows: its axes with σ, and log.csv of each.
+/// Result document of a head's identification: its axes with σ, and log.csv of each.
 [[nodiscard]] JobOutcome outcome_of(const HeadIdentification& identified);
-/// Of what it and its camera show: camera.yaml, rig.yaml, log.csv.
+/// Result document of a head's calibration with its camera: camera.yaml, rig.yaml, log.csv.
 [[nodiscard]] JobOutcome outcome_of(const HeadCalibration& calibration);
-/// Its files while it runs: log.csv, and those of the estimate where there is one.
+/// Files of a calibration in progress: log.csv, and those of the estimate if there is one.
 [[nodiscard]] std::vector<NamedBytes> files_so_far(const HeadCalibration& calibration);
-/// Of how it followed a target: follow.csv.
+/// Result document of following a target: follow.csv.
 [[nodiscard]] JobOutcome outcome_of(const HeadFollowing& following);
 [[nodiscard]] std::vector<NamedBytes> files_so_far(const HeadFollowing& following);
 

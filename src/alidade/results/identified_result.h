@@ -7,14 +7,14 @@
 
 namespace alidade {
 
-/// Pan and tilt of a head as they were identified, and the larger step of what they read.
+/// Identified pan and tilt axes of a head, and the larger step of its readings.
 struct IdentifiedHead {
   std::array<PositionerParams, 2> axes;
   double resolution_rad = 0.0;
 };
 
-/// Reads what `head --follow` needs of the folder (or result.json) of an `alidade head --identify`; what its log did
-/// not show is as it usually is. Throws InputError: not such a result, or a refused one.
+/// Reads what `head --follow` needs from the folder of an `alidade head --identify` (or its result.json); what its log
+/// did not determine has its usual value. Throws InputError if it is not such a result, or was refused.
 [[nodiscard]] IdentifiedHead read_identified_head(const std::filesystem::path& result,
                                                   const PositionerParams& usual_axis);
 

@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// The board in the estimate of a result.json, from its JSON text. Throws InputError where it is none.
+/// The board in the estimate of a result.json, from its JSON text. Throws InputError if there is none.
 [[nodiscard]] Board result_board(const std::string& json);
 
 }  // namespace alidade

@@ -11,23 +11,23 @@
 
 namespace alidade {
 
-/// The files of a run on their way into a folder: all of them take their place at once, or none does. What an earlier
-/// run left there and this one does not replace goes, by its result.json; but a refusal has nothing to put in the place
-/// of an estimate, leaves that alone, and goes to FOLDER/refused.
+/// Writes the files of a run into a folder, all at once or none. Files that an earlier run left there, according to its
+/// result.json, and that are not replaced are removed; but a refusal has no estimate to replace an earlier one, does
+/// not touch it, and is written to FOLDER/refused.
 class ResultFolder {
  public:
-  /// `document` has its verdict and inputs. Files that this run read are left alone. Throws InputError where nothing
-  /// can be written there.
+  /// `document` has its verdict and inputs. Files that this run read are not touched. Throws InputError if nothing can
+  /// be written there.
   ResultFolder(const std::filesystem::path& out, const ResultDocument& document);
 
-  /// Where the files will stand: the folder, or `refused` in it.
+  /// The final place of the files: the folder, or `refused` in it.
   [[nodiscard]] const std::filesystem::path& path() const { return folder_; }
   [[nodiscard]] bool is_aside() const { return is_aside_; }
   void add(const std::filesystem::path& name, std::string_view bytes);
-  /// report.html of result.json's text, with as many of the images (the most wanted first) as a page of 12 MB holds.
-  /// Throws where it cannot be made.
+  /// Adds report.html from the text of result.json, with as many images (the most important first) as a page of 12 MB
+  /// holds. Throws if it cannot be made.
   void add_report(const std::string& result_text, std::vector<NamedBytes> images);
-  /// Puts everything in its place. Throws InputError; then all is as it was.
+  /// Moves everything into place. Throws InputError after undoing everything.
   void commit();
 
  private:
@@ -37,11 +37,11 @@ class ResultFolder {
   FolderSwap swap_;
 };
 
-/// What every finished document keeps to: an estimate that its checks speak against ends in that exit code, and inputs
-/// have one order, whichever thread read them first.
+/// Completes a document: an estimate that its checks contradict gets that exit code, and inputs are sorted, whichever
+/// thread read them first.
 void settle(ResultDocument& document);
 
-/// Seconds since 1970 as 2026-01-31T12:00:00Z, now.
+/// The present time as 2026-01-31T12:00:00Z.
 [[nodiscard]] std::string utc_now();
 
 }  // namespace alidade

@@ -10,15 +10,15 @@
 
 namespace alidade {
 
-/// Text of study.json: what depends on the study alone, and on no host, time, thread, rank or shard.
+/// Text of study.json: depends on the study only, not on host, time, thread, rank or shard.
 [[nodiscard]] std::string study_text(const StudyHeader& header, std::span<const StudyTally> points);
 
-/// The document of a study, its printed lines, and study.json where all of its trials are there (`is_whole`; else
-/// the shard that they are).
+/// Result document and printed lines of a study, and study.json if all of its trials are there (`is_whole`; otherwise
+/// they are those of a shard).
 [[nodiscard]] JobOutcome outcome_of(const StudyHeader& header, std::span<const StudyTally> points,
                                     const Shard& shard = {});
 
-/// One trial again, with all that the command of the estimator leaves: its report, and the files that it took.
+/// Repeats one trial, with everything that the estimator's command writes: its report, and the input files.
 [[nodiscard]] JobOutcome trial_outcome(const ObserveStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] JobOutcome trial_outcome(const CalibrateStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] JobOutcome trial_outcome(const RangefinderStudy& study, std::uint64_t seed, std::uint64_t trial);

@@ -6,14 +6,14 @@
 
 namespace alidade {
 
-/// Fills counts, estimate, stddev, covariance, data tables and grids of `document` from a calibration: the names of
-/// docs' contract for `calibrate`. For a refusal, what there is.
+/// Fills counts, estimate, stddev, covariance, data tables and grids of `document` from a calibration, with the
+/// documented names for `calibrate`; for a refusal, as far as available.
 void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document);
 
-/// Table `next`: poses and what they bring.
+/// Table `next`: proposed poses and their benefit.
 [[nodiscard]] DataTable next_photos_table(const NextPhotoPlan& plan);
 
-/// Table `points_in_board`: x_m, y_m, z_m of the points of a board in its own frame, to draw it by.
+/// Table `points_in_board`: x_m, y_m, z_m of a board's points in its own frame, for drawing.
 [[nodiscard]] DataTable points_in_board_table(const std::vector<Eigen::Vector3d>& points_in_board);
 
 }  // namespace alidade

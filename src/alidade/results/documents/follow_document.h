@@ -7,8 +7,8 @@
 
 namespace alidade {
 
-/// Table `follow`: where the target stood in each frame, and where the head was, was asked to be, and would have been
-/// right.
+/// Table `follow`: in each frame the position of the target, and the actual, commanded and correct angles of the
+/// head.
 [[nodiscard]] DataTable follow_table(std::span<const FollowedFrame> frames);
 
 }  // namespace alidade

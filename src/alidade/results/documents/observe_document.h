@@ -5,10 +5,10 @@
 
 namespace alidade {
 
-/// Fills counts, estimate, stddev, covariance and data of the document of `alidade observe`; also for a refusal.
+/// Fills counts, estimate, stddev, covariance and data of the document of `alidade observe`, also for a refusal.
 void fill_observation(const ObserveReport& report, ResultDocument& document);
 
-/// One row of `steps`.
+/// One row of the table `steps`.
 [[nodiscard]] DataTable observe_row(const ObserveStep& step);
 
 }  // namespace alidade

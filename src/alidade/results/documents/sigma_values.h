@@ -9,8 +9,8 @@
 
 namespace alidade {
 
-/// How the stated σ came about: by how much the clusters' scatter raised the model's, and how sure that is. `given`:
-/// the names of the parameters that are estimated, each with its index in the covariance.
+/// Derivation of the stated σ: the factor by which the clusters' scatter raised the model's, and its certainty.
+/// `given`: the names of the estimated parameters, each with its index in the covariance.
 [[nodiscard]] JsonValue sigma_values(std::span<const std::pair<std::string, Eigen::Index>> given,
                                      const ClusterCovariance& clusters);
 

@@ -35,7 +35,7 @@ Points near_direction(const Eigen::Vector3d& direction, std::span<const Eigen::V
 
 constexpr std::size_t num_near = 6;
 
-/// Least-squares plane through the nearest of the points. The roughness is corrected for the number of points.
+/// Least-squares plane through the nearest of the points, at most six. The roughness is scaled to that of six.
 BeamSurface plane_through(Points points) {
   constexpr std::size_t of_plane = 3;
   points.resize(std::min(points.size(), num_near));

@@ -39,8 +39,8 @@ void add_hidden(const Localization& report, Verdict& verdict);
 /// State bad above `bad`, else care above `care`.
 [[nodiscard]] State state_of(double value, double care, double bad);
 
-/// |z| of a score test, combined with a wide prior of lens parameters: if the observations determine one less than
-/// that, as those of a still camera, z is small.
+/// |z| of a score test, combined with a wide prior of lens parameters: if the observations determine one less precisely
+/// than that, as those of a still camera do, z is reduced.
 [[nodiscard]] double supported_z(const GivenNumber& given, const Camera& camera);
 
 /// Change of the path, in its σ, by the change that a score test indicates; for a moving target also its displacement

@@ -35,8 +35,8 @@ class MeanResidual {
   [[nodiscard]] Eigen::RowVectorXd moves() const { return moves_ / num_; }
   [[nodiscard]] double mean() const { return sum_ / num_; }
   [[nodiscard]] double mean_px() const { return sum_px_ / num_; }
-  /// Variance of the mean by chance. For clusters by point, mean²/variance is the square of Student's t with one degree
-  /// of freedom less than there are points, over its own mean.
+  /// Variance of the mean by chance. With clusters by point, mean²/variance is the square of Student's t, for one
+  /// degree of freedom less than there are points, divided by its expectation.
   [[nodiscard]] double variance(bool lasts) const {
     if (!lasts) return 1.0 / num_;
     double squares = 0.0;

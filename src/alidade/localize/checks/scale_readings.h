@@ -19,7 +19,7 @@ struct ReadScale {
   double scale = 1.0;      ///< Metres per unit of the path.
   double sigma_rel = 1.0;  ///< Relative σ of the scale.
   std::size_t num_used = 0, num_rejected = 0;
-  double late_s = 0.0;     ///< Delay of the readings' clock relative to the path's, if significant.
+  double late_s = 0.0;     ///< Readings' clock minus the path's, if significant; corrected.
   double offset_m = 0.0;   ///< Constant excess of a rangefinder's readings, if significant.
   double aside_rad = 0.0;  ///< Angle by which a rangefinder's beam deviates from the given direction, if significant.
   /// Relative scale error if all readings were 0.1 m too long, where that would be undetectable; else 0.

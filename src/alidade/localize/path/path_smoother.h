@@ -91,7 +91,7 @@ struct SmootherProblem {
   bool compares_causes = false;
   std::optional<Lens> freed_lens;   ///< Initial guess of a lens that was already freed.
   std::optional<SmootherImu> imu;   ///< Its unit of length is then the metre.
-  LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
+  LocalizationFilterConfig filter;  ///< σ of accelerations, the gate, and the estimated lens parameters.
 };
 
 /// Maximum a posteriori estimate of path, map and lens, with covariance. The given covariance of the lens and the

@@ -53,16 +53,16 @@ std::vector<Claim> noise_claims(const NoiseScores& scores) {
   Claim errors{"exp1-errors-1s", "first six errors settle within 1 s", "s", 1.0, median(scores.errors_settle)};
   errors.holds = at_most(scores.errors_settle, 1.0);
   errors.words =
-      "With the fast gains; settled means below 1.3 px, three sigma of a difference. They begin at zero, so that "
-      "any gain k1 of 4/s or more does it, whatever the intrinsics are worth.";
+      "With the fast gains; settled means below 1.3 px, three sigma of a difference. They start at zero, so any gain "
+      "k1 of 4/s or more achieves this, however wrong the intrinsics are.";
   errors.figure = "3";
   Claim stable{
       "exp1-stable-3s",          "intrinsics stable within 3 s under noise", "s", 3.0, median(scores.quiet_settle),
       median(scores.best_settle)};
   stable.holds = at_most(scores.quiet_settle, 3.0);
   stable.words =
-      "Within 5 % and staying there. Gains that bear this noise take longer; gains that settle in 3 s do not "
-      "bear it.";
+      "Within 5 % and staying there. Gains that tolerate this noise take longer; gains that settle in 3 s do not "
+      "tolerate it.";
   stable.figure = "4";
   Claim robust{"exp1-robust",
                "focal lengths after 14 s stay within 5 % under noise on every frame",
@@ -152,7 +152,7 @@ std::vector<Claim> burst_claims(const BurstScores& scores) {
               quantile_of(scores.best_again, 0.5)};
   again.holds = at_most(scores.again, 2.0);
   again.words =
-      fmt::format("Within 1 %; nine in ten: {:.1f} s. Ours leaves that frame out.", quantile_of(scores.again, 0.9));
+      fmt::format("Within 1 %; nine in ten: {:.1f} s. Ours rejects that frame.", quantile_of(scores.again, 0.9));
   stable.figure = again.figure = "6";
   return {stable, again};
 }
@@ -161,7 +161,7 @@ Experiment experiment_2(const ReproduceConfig& config) {
   Experiment experiment{
       "exp2", "One frame with noise",
       "As experiment 1 without noise; the pixels of the frame at 6 s are off by 3 px (standard deviation).",
-      "Gains: fast, which no noise would leave usable."};
+      "Gains: fast, which are unusable with any noise."};
   experiment.claims = burst_claims(score_burst(config));
   const RotationLog clean = clean_log(figure_points());
   RotationLog log = clean;
@@ -171,7 +171,7 @@ Experiment experiment_2(const ReproduceConfig& config) {
       titled(errors_figure("5", log, ours), "Errors of the first six states, one frame with noise",
              "Without noise but in the frame at 6 s, whose pixels are off by 3 px; fast gains.", "error"),
       titled(intrinsics_figure("6", log, ours, run_hybrid(log)), "Intrinsics, one frame with noise",
-             "The same run; dashed ours, which leaves that frame out.", "intrinsics")};
+             "The same run; dashed: ours, which rejects that frame.", "intrinsics")};
   return experiment;
 }
 
@@ -216,7 +216,8 @@ std::vector<Claim> zoom_claims(const ZoomScores& flow_only, const ZoomScores& ph
                median(physical.ramp),
                median(physical.best_ramp)};
   camera.holds = at_most(physical.ramp, tracked_percent);
-  camera.words = "(11) lacks the flow of the zoom itself, f'/f (p - u) + u': with it the observer is lost on the ramp.";
+  camera.words =
+      "(11) lacks the flow of the zoom itself, f'/f (p - u) + u': with it the observer does not follow the ramp.";
   camera.figure = "8";
   Claim zero{"exp3-after-zero",
              "errors go to zero after the ramp, without noise",
@@ -233,10 +234,9 @@ std::vector<Claim> zoom_claims(const ZoomScores& flow_only, const ZoomScores& ph
 Experiment experiment_3(const ReproduceConfig& config) {
   Experiment experiment{"exp3", "A zoom of 24 px in 4 s",
                         "As experiment 2 without the burst; fx, fy, u0, v0 grow by 6 px/s from 6 to 10 s (29). Once "
-                        "with pixels as a camera "
-                        "under such a zoom has them, once with pixels integrated from the paper's flow (11), as its "
-                        "simulation must have been.",
-                        "Gains: fast. What is called tracking: see the claims."};
+                        "with the pixels of a camera under such a zoom, once with pixels integrated from the paper's "
+                        "flow (11), as in its simulation presumably.",
+                        "Gains: fast. For the meaning of tracking see the claims."};
   experiment.claims = zoom_claims(score_zoom(config, flow_only_zoom_log, false), score_zoom(config, zoom_log, true));
   const RotationLog clean = clean_log(figure_points()), own = flow_only_zoom_log(figure_points()),
                     camera = zoom_log(figure_points());

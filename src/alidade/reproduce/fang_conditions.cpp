@@ -62,9 +62,9 @@ Claim enough_points(const ReproduceConfig& config) {
   const double three = lambda_of(paper_scene({{180.0, 120.0}, {640.0, 90.0}, {400.0, 450.0}})),
                line = lambda_of(paper_scene({start, start + oblique, start + 2.0 * oblique, start + 3.0 * oblique}));
   claim.words = fmt::format(
-      "Enough, not needed: three points do (least eigenvalue of the Gramian {:.2g}), and so do four on an "
-      "oblique line ({:.2g}); below 1e-4 nothing should be trusted. A set that is badly spread takes "
-      "longer than the 20 s there are.",
+      "Sufficient, but not necessary: three points suffice (least eigenvalue of the Gramian {:.2g}), and so do four on "
+      "an oblique line ({:.2g}); below 1e-4 nothing should be trusted. A badly spread set takes longer than the 20 s of "
+      "the experiment.",
       three, line);
   claim.figure = "points";
   return claim;
@@ -82,12 +82,9 @@ Claim enough_motion(const ReproduceConfig& config, Experiment& experiment) {
               "px", not_a_number, fy_error_px};
   claim.holds = fy_error_px <= 7.0 ? Holds::reproduced : Holds::not_reproducible;
   claim.words = fmt::format(
-      "False. Three rows of the regressor hold the one rate and three the other: both must keep coming. On a pan alone "
-      "the "
-      "least eigenvalue of the Gramian is {:.1g} and fy stays at its first guess. Ours says what it cannot determine: "
-      "its "
-      "sigma "
-      "of fy is {:.0f} px, and `alidade observe` refuses such a log.",
+      "False. Three rows of the regressor contain one rate and three the other, so both must be excited persistently. "
+      "On a pan alone the least eigenvalue of the Gramian is {:.1g} and fy stays at its first guess. Ours reports what "
+      "it cannot determine: its sigma of fy is {:.0f} px, and `alidade observe` refuses such a log.",
       lambda_of(scene), best_sigma);
   claim.figure = "motion";
   experiment.figures.push_back(titled(

@@ -113,9 +113,10 @@ Experiment wang_poses(const ReproduceConfig& config) {
       "Simulated logs of 3 to 30 shots on boards between 0.5 and 4 m; method 1 (spots) and method 2 (planes), each "
       "without (lens and boards fixed) and with global optimisation, and ours (both kinds of measurement together).",
       "The paper does not say its noise: readings 1 mm, corners 0.1 px, spots 0.3 px, lens known to 1.5, 1.5, 2, 2 px. "
-      "With readings of 2 mm method 2 needs 24 poses and more for 3 px. What the captions leave open: the error of "
-      "figures 7 and 8 is taken in the image, that of figure 9 in space; figure 8 at 18 poses. Of what these figures "
-      "show no value is printed."};
+      "With readings of 2 mm method 2 needs 24 poses and more for 3 px. Assumed, as the captions do not say: the error "
+      "of "
+      "figures 7 and 8 is taken in the image, that of figure 9 in space; figure 8 at 18 poses. The paper prints no "
+      "values for these figures."};
   experiment.claims = {within_3px(table, spot_global, at_14, "method1-from-14", "7"),
                        within_3px(table, plane_global, at_18, "method2-from-18", "7"), improves_beyond_15(table),
                        global_is_better(table), spot_is_better(table)};

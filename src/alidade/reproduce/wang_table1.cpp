@@ -72,7 +72,7 @@ Claim squares_claim() {
   }
   Claim claim{"table1-d-is-n2", "|d| is |N|² in every row: largest deviation", "%", not_a_number, 100.0 * worst};
   claim.holds = 100.0 * worst <= 0.01 ? Holds::reproduced : Holds::not_reproducible;
-  claim.words = "To the digits that are printed.";
+  claim.words = "To the printed digits.";
   return claim;
 }
 
@@ -85,7 +85,7 @@ Claim signs_claim() {
   claim.holds = in_front == 6 ? Holds::reproduced : Holds::not_reproducible;
   claim.words =
       "N = -R3 (R3't) has the wrong sign: the foot of the plane is +R3 (R3't) and d = -|N|². As printed, c < 0 puts "
-      "every board behind the camera; turned round the distances are those of the table's figure.";
+      "every board behind the camera; with the sign reversed the distances are those of the table's figure.";
   return claim;
 }
 
@@ -99,7 +99,7 @@ Claim tells_claim(const std::vector<Shot>& shots, const RangefinderSceneConfig& 
   claim.holds = claim.rerun <= 10.0 ? Holds::reproduced : Holds::not_reproducible;
   const auto [least, most] = std::ranges::minmax(shots, {}, &Shot::range_m);
   claim.words = fmt::format(
-      "Their readings differ by {:.1f} % only, and what moves the origin along the beam then hardly moves a reading: "
+      "Their readings differ by {:.1f} % only, and a shift of the origin along the beam then hardly changes a reading: "
       "even with planes known exactly and readings of 1 mm these boards cannot determine t. Ours: boards and spots "
       "together.",
       100.0 * (most.range_m - least.range_m) / least.range_m);

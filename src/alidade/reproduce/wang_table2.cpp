@@ -185,7 +185,7 @@ Experiment wang_table_2(const ReproduceConfig& config) {
                             "mrad", 1.0, spot.angles_mrad, joint.angles_mrad);
   angles.words =
       "Median error of either angle over logs of 18 shots of a beam with the paper's angles and origin; its camera's "
-      "principal point, known to 2 px, is what limits it. Readings 2 mm, spots 0.3 px, corners 0.2 px.";
+      "principal point, known to 2 px, is the limit. Readings 2 mm, spots 0.3 px, corners 0.2 px.";
   Claim origin = printed_to("table2-origin", "origin of the beam by method 1, to the 10 mm that Table 2 prints", "mm",
                             10.0, spot.origins_mm, joint.origins_mm);
   origin.words = fmt::format(
@@ -199,12 +199,12 @@ Experiment wang_table_2(const ReproduceConfig& config) {
                  edges.direction_mrad,
                  joint.direction_mrad};
   existing.holds = edges.direction_mrad < 0.5 * 39.0 ? Holds::reproduced : Holds::not_reproducible;
-  existing.words = "A legitimate direction to some mrad without a target; its origin is known to centimetres only.";
+  existing.words = "The direction is correct to some mrad without a target; its origin is known to centimetres only.";
   existing.figure = "table_2";
   Experiment experiment{"table2", "Table 2: three algorithms",
                         "18 boards of 9×6 corners between 0.5 and 4 m, tilted up to 45°; the beam has the angles 1.557 "
                         "and 1.586 and the origin (40, -70, 40) mm; methods 1 and 2 with global optimisation. The "
-                        "existing algorithm lays the edges of a scan on the edges of a photo, in a room of its own: "
+                        "existing algorithm fits the edges of a scan to the edges of a photo, in a separate room: "
                         "six boxes before a wall, 320×240 px.",
                         "Noise, boards and room are ours. The table's t is taken to be in metres."};
   experiment.claims = {angles, origin, existing};

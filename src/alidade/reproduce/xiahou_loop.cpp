@@ -154,7 +154,8 @@ std::vector<Claim> loop_claims(const LoopShares& shares, const ServoRun& ours) {
                  shares.fed_back_percent};
   fed_back.holds = near_to(fed_back.rerun, 100.0, 0.01);
   fed_back.words =
-      "It would wherever the target is: the estimate is projected with the angles that it was computed from.";
+      "This holds wherever the target is, because the estimate is projected with the angles from which it was "
+      "computed.";
   Claim follows{"loop-follows",
                 "the loop as printed keeps the target in the central third of both images",
                 "%",
@@ -162,7 +163,7 @@ std::vector<Claim> loop_claims(const LoopShares& shares, const ServoRun& ours) {
                 shares.true_percent,
                 100.0 * ours.figures.central_third};
   follows.holds = near_to(follows.rerun, 100.0, 0.01);
-  follows.words = "The target's true image, which nothing in figure 2 takes in. Ours: measured pixels, 0.5 px.";
+  follows.words = "The target's true image, which no part of figure 2 uses. Ours: measured pixels, 0.5 px.";
   Claim moves{"loop-moves",
               "the heads follow the target where d1 to d4 are zero: travel of the first pan",
               "°",

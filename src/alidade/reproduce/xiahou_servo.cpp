@@ -52,7 +52,7 @@ Claim stability_claim() {
               not_a_number, degrees};
   claim.holds = degrees < 1.0 ? Holds::in_shape : Holds::not_reproducible;
   claim.words = fmt::format(
-      "The plant is printed without a unit. With its output in degrees and the error in pixels the loop is "
+      "The paper prints the plant without a unit. With its output in degrees and the error in pixels the loop is "
       "stable; in radians it is not ({:.3g}).",
       radians);
   claim.figure = "4";
@@ -78,8 +78,8 @@ Experiment xiahou_servo(const ReproduceConfig& config) {
                100.0 * best.central_third};
   centre.holds = near_to(centre.rerun, 100.0, 0.01);
   centre.words = fmt::format(
-      "{:.1f} px RMS from the centre, ours {:.2f} px. What is fed back is the measured pixel; the loop as "
-      "the paper prints it stands below.",
+      "{:.1f} px RMS from the centre, ours {:.2f} px. Here the measured pixel is fed back; the loop as the paper "
+      "prints it is below.",
       pi.rms_px, best.rms_px);
   centre.figure = "4";
   Claim manoeuvring{"servo-lively", "the same on a circle of 0.3 m in 2 s", "%",

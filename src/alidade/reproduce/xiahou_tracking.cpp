@@ -104,7 +104,7 @@ Experiment xiahou_tracking(const ReproduceConfig& config) {
   mean.words = fmt::format(
       "Q = I6 a step, as its third step has it; insensitive to the circle's radius, for it is noise alone. "
       "Q = GG', as (1) has it, gives {:.2f} cm on a circle of 6 cm: the figure shows neither. Its R takes "
-      "5.3° of angle and 0.1 cm for the same noise, so it says nothing of real encoders and pixels.",
+      "5.3° of angle and 0.1 cm for the same noise, so it does not apply to real encoders and pixels.",
       quantile_of(other.mean_cm, 0.5));
   Claim most{"rmse-max", "largest error of the position", "cm", 8.0, quantile_of(first.max_cm, 0.5)};
   most.holds = at_most(first.max_cm, 8.0);
@@ -113,7 +113,7 @@ Experiment xiahou_tracking(const ReproduceConfig& config) {
   Claim sure{"covariance", "the filter's covariance covers its errors with Q = GG': NEES, of which 3 is right", "",
              not_a_number, quantile_of(other.nees, 0.5)};
   sure.holds = near_to(sure.rerun, 3.0, 0.2);
-  sure.words = fmt::format("Far too sure: its lag is not noise. With Q = I6 {:.2g}.", quantile_of(first.nees, 0.5));
+  sure.words = fmt::format("Far too certain: its lag is not noise. With Q = I6 {:.2g}.", quantile_of(first.nees, 0.5));
   for (Claim* claim : {&mean, &most, &sure}) claim->figure = "5";
   return {"tracking",
           "Figure 5: trajectory and error",

@@ -99,7 +99,7 @@ Claim exceed(const Trials& trials) {
   claim.holds = claim.rerun >= 20.0  ? Holds::reproduced
                 : claim.rerun >= 5.0 ? Holds::in_shape
                                      : Holds::not_reproducible;
-  claim.words = "From frame 10 on. Ours: our filter with the whole lens.";
+  claim.words = "From frame 10 on. Ours: our filter with the full lens model.";
   return claim;
 }
 
@@ -194,9 +194,9 @@ std::string words_on_higher_order(const Trials& trials) {
     return median_of(trials.ours[lens], figure);
   };
   return fmt::format(
-      "It is the tangential pair that does it; k2 hardly matters. The camera's own position gains more: "
+      "The tangential pair causes this; k2 hardly matters. The camera's own position gains more: "
       "{:.0f}, {:.0f}, {:.0f} mm in the last frame, ours {:.0f} mm. NEES of point 1 (1 is right) {:.0f}, "
-      "{:.1f}, {:.2f}: the lesser lenses are far too sure.",
+      "{:.1f}, {:.2f}: the lesser lenses are far too certain.",
       median(0, &ProtocolRun::camera_mm), median(1, &ProtocolRun::camera_mm), median(2, &ProtocolRun::camera_mm),
       median_of(trials.best[2], &ProtocolRun::camera_mm), median(0, &ProtocolRun::p1_nees),
       median(1, &ProtocolRun::p1_nees), median(2, &ProtocolRun::p1_nees));
@@ -227,9 +227,8 @@ std::vector<Claim> claims_from_images(const Trials& trials) {
   whole.holds = whole.ours < 0.5 ? Holds::reproduced : whole.ours < 1.0 ? Holds::in_shape : Holds::not_reproducible;
   whole.words = fmt::format(
       "Mean errors of point 1: {}; {:.0f} % of the pinhole's frames beyond 2 %. {} sequences. Corners are found to "
-      "{:.3f} px (RMS; by their own sigma chi-squared is {:.2f} per degree of freedom): what is left with the whole "
-      "lens "
-      "is the 1 mm to which the points of the board are known.",
+      "{:.3f} px (RMS; by their own sigma chi-squared is {:.2f} per degree of freedom): the remaining error with the "
+      "whole lens is the 1 mm to which the points of the board are known.",
       corner.words(), 100.0 * mean_of(trials.ours[0], &ProtocolRun::p1_above_2), trials.ours[0].size(),
       quantile_of(trials.observations_rms_px, 0.5), quantile_of(trials.observations_chi2, 0.5));
   Claim higher = higher_order_improves(corner, best_corner);
@@ -266,8 +265,8 @@ Experiment from_images(const Trials& trials) {
       "figure10-pictures",
       "Figure 10 from rendered images",
       "The same paths, but each frame is a rendered image of the board through turbid water: attenuated by "
-      "Beer–Lambert along each pixel's ray, veiled, blurred (1 px), with noise (4 of 255). The eight points are what "
-      "`find_board` finds in it, each image by itself; the filters are the same.",
+      "Beer–Lambert along each pixel's ray, veiled, blurred (1 px), with noise (4 of 255). The eight points are found "
+      "by `find_board`, in each image separately; the filters are the same.",
       "Attenuation 1.2, 0.5, 0.45 per metre (red, green, blue), a wall behind the board, one more square all round "
       "it so that its outermost vertices are corners. The filters take the 0.5 px of the points, though the corners "
       "are better.",

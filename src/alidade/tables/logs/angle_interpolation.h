@@ -6,23 +6,23 @@
 
 namespace alidade {
 
-/// Rotation of a log at other times than its rows'.
+/// Rotation of a log at times between its rows.
 class AngleInterpolation {
  public:
-  /// Of several rows of one time the first counts; of pan, tilt and roll the shorter way round is taken.
+  /// Of several rows with one time the first is used; pan, tilt and roll take the shorter way round.
   explicit AngleInterpolation(const RotationLog& angles);
 
   [[nodiscard]] double first_s() const { return rows_.front().t_s; }
   [[nodiscard]] double last_s() const { return rows_.back().t_s; }
   [[nodiscard]] bool covers(double t_s) const;
 
-  /// A row without pixels: the cubic through four rows (Hermite's, with the slopes of parabolas), for attitudes through
-  /// their rotation vectors. Between rows of which one was not measured it is not known.
+  /// A row without pixels: the cubic through four rows (Hermite's, with the slopes of parabolas), for attitudes by
+  /// their rotation vectors. It is not known between rows of which one was not measured.
   [[nodiscard]] RotationRow at(double t_s) const;
-  /// Straight between the rows; the log must have truth.
+  /// Linear between the rows; the log must have truth.
   [[nodiscard]] TrueIntrinsics truth_at(double t_s) const;
 
-  /// Rows strictly between two times.
+  /// The rows strictly between two times.
   [[nodiscard]] std::vector<RotationRow> between(double begin_s, double end_s) const;
 
  private:

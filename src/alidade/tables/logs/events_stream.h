@@ -13,28 +13,28 @@
 
 namespace alidade {
 
-/// The columns that a table of events has.
+/// The columns of a table of events.
 struct EventColumns {
   std::string pan, tilt, u, v;
   bool has_arrival = false, from_centre = false;
 };
 
-/// Rows of events, each checked against those before it.
+/// Rows of events, each checked against the previous ones.
 class EventRows {
  public:
-  /// `layout` has the header. Throws InputError: a column is missing.
+  /// `layout` has the header. Throws InputError for a missing column.
   EventRows(const Csv& layout, std::span<const RigHead> heads, bool stands_still);
 
-  /// Throws InputError; such a row counts for nothing.
+  /// Throws InputError; such a row is ignored in later checks.
   [[nodiscard]] TargetObservation read(const Csv& csv, std::size_t row);
 
  private:
   std::span<const RigHead> heads_;
   bool stands_still_;
   EventColumns columns_;
-  std::vector<double> newest_s_;  ///< Arrival of the newest row so far; of one clock for all heads, or one for each.
+  std::vector<double> newest_s_;  ///< Newest arrival; one clock for all heads, or one per head.
   std::vector<std::optional<Eigen::Vector2d>> first_rad_;
-  std::vector<Eigen::Vector2d> last_rad_;  ///< What each head's encoders read last; at first their zeros.
+  std::vector<Eigen::Vector2d> last_rad_;  ///< Last readings of each head's encoders; initially zero.
   std::vector<std::set<double>> seen_s_;   ///< Newest capture times of each head.
 };
 
@@ -45,7 +45,7 @@ class EventsStream {
   EventsStream(std::istream& in, const std::string& name, std::span<const RigHead> heads,
                const EventsOptions& options = {});
 
-  /// The next row that is not rejected; none at the end. Throws InputError, also where there is no row at all.
+  /// The next row that is not rejected; none at the end. Throws InputError, also if there is no row at all.
   [[nodiscard]] std::optional<TargetObservation> next();
   [[nodiscard]] const std::vector<SkippedInput>& skipped() const { return skipped_; }
 

@@ -9,10 +9,10 @@
 
 namespace alidade {
 
-/// Index in the rig's list of the head whose id is in column `head`. Throws InputError: no such head.
+/// Index in the rig's list of the head whose id is in column `head`. Throws InputError if there is no such head.
 [[nodiscard]] std::size_t head_in_row(const Csv& csv, std::size_t row, std::span<const RigHead> heads);
 
-/// An angle [rad] of a row. Throws InputError: not a number, or too large for one.
+/// An angle [rad] in a row. Throws InputError if it is not a number, or too large for an angle.
 [[nodiscard]] double angle_in_row(const Csv& csv, std::size_t row, const std::string& column);
 
 }  // namespace alidade

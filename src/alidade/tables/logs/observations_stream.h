@@ -11,18 +11,18 @@
 
 namespace alidade {
 
-/// Frames out of rows of observations, each row checked against those before it. Numbers that are missing between
-/// frames become frames without observations.
+/// Builds frames from rows of observations, each checked against the previous ones. Missing frame numbers become frames
+/// without observations.
 class ObservationRows {
  public:
-  /// `layout` has the header. Throws InputError: a column is missing.
+  /// `layout` has the header. Throws InputError for a missing column.
   ObservationRows(const Csv& layout, const ObservationsOptions& options);
 
-  /// Throws InputError; such a row counts for nothing.
+  /// Throws InputError; such a row is ignored in later checks.
   void read(const Csv& csv, std::size_t row);
-  /// No more rows follow: the last frame is complete.
+  /// Declares that no more rows follow: the last frame is complete.
   void end();
-  /// The next frame that is complete: a row of a later one was read.
+  /// The next complete frame: a row of a later one has been read.
   [[nodiscard]] std::optional<ObservationFrame> next();
 
  private:
@@ -31,8 +31,8 @@ class ObservationRows {
   void complete();
 
   ObservationsOptions options_;
-  std::optional<ObservationFrame> open_;  ///< Its rows may still come.
-  std::optional<ObservationFrame> last_;  ///< Before it, without its observations.
+  std::optional<ObservationFrame> open_;  ///< The present frame: rows may follow.
+  std::optional<ObservationFrame> last_;  ///< The frame before it, without its observations.
   std::deque<ObservationFrame> complete_;
 };
 
@@ -43,7 +43,7 @@ class ObservationsStream {
   /// Reads the header. Throws InputError.
   ObservationsStream(std::istream& in, const std::string& name, const ObservationsOptions& options);
 
-  /// The next frame; none at the end. Throws InputError, also where there is no row at all.
+  /// The next frame; none at the end. Throws InputError, also if there is no row at all.
   [[nodiscard]] std::optional<ObservationFrame> next();
   [[nodiscard]] const std::vector<SkippedInput>& skipped() const { return skipped_; }
 

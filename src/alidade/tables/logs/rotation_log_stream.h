@@ -22,9 +22,9 @@ class RotationLogStream {
   /// Reads the header.
   RotationLogStream(std::istream& in, const std::string& name, const RotationLogOptions& options = {});
 
-  /// A log without rows: what every row will have.
+  /// A log without rows, which defines what every row has.
   [[nodiscard]] const RotationLog& layout() const { return layout_; }
-  /// The next row that is not rejected; none at the end. Throws InputError; the call after that goes on behind the
+  /// The next row that is not rejected; none at the end. Throws InputError; the next call continues after the
   /// fault.
   [[nodiscard]] std::optional<RotationLogEntry> next();
   [[nodiscard]] const std::vector<SkippedInput>& skipped() const { return skipped_; }
@@ -38,7 +38,7 @@ class RotationLogStream {
   RotationLogColumns columns_;
   RotationLog layout_;
   std::optional<RotationLogEntry> last_;
-  Eigen::Vector3d last_angles_ = Eigen::Vector3d::Zero();  ///< Those of the newest row that has some.
+  Eigen::Vector3d last_angles_ = Eigen::Vector3d::Zero();  ///< Angles of the newest row with angles.
   std::vector<SkippedInput> skipped_;
 };
 

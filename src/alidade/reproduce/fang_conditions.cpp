@@ -63,8 +63,8 @@ Claim enough_points(const ReproduceConfig& config) {
                line = lambda_of(paper_scene({start, start + oblique, start + 2.0 * oblique, start + 3.0 * oblique}));
   claim.words = fmt::format(
       "Sufficient, but not necessary: three points suffice (least eigenvalue of the Gramian {:.2g}), and so do four on "
-      "an oblique line ({:.2g}); below 1e-4 nothing should be trusted. A badly spread set takes longer than the 20 s of "
-      "the experiment.",
+      "an oblique line ({:.2g}); below 1e-4 nothing should be trusted. A badly spread set takes longer than the 20 s "
+      "of the experiment.",
       three, line);
   claim.figure = "points";
   return claim;

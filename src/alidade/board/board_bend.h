@@ -5,8 +5,8 @@
 
 namespace alidade {
 
-/// Ways in which a board may bend, by the box of its printed points: heights above its plane that are 1 in the centre
-/// and 0 at the border of a bow along x, of one along y, and 1 and −1 at the corners of a twist.
+/// Modes in which a board may bend, relative to the bounding box of its printed points: heights above its plane that
+/// are 1 in the centre and 0 at the border for a bow along x or along y, and 1 and −1 at the corners for a twist.
 class BoardBend {
  public:
   explicit BoardBend(std::span<const Eigen::Vector3d> printed_points);

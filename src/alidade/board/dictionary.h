@@ -8,19 +8,19 @@
 
 namespace alidade {
 
-/// A predefined family of square markers: its number in OpenCV's list and how many markers it has.
+/// A predefined family of square markers: its number in OpenCV's list and its number of markers.
 struct MarkerDictionary {
   int opencv_id = 0;
   int num_markers = 0;
 };
 
-/// The dictionary of a name such as DICT_5X5_100. None for an unknown name.
+/// The dictionary with a name such as DICT_5X5_100. None for an unknown name.
 [[nodiscard]] std::optional<MarkerDictionary> marker_dictionary(std::string_view name);
 
 /// All names, comma-separated, for messages.
 [[nodiscard]] std::string marker_dictionary_names();
 
-/// Why there is no such board, in one sentence without a full stop; empty where there is one.
+/// Why such a board is impossible, in one sentence without a full stop; empty if it is possible.
 [[nodiscard]] std::string fault(const Board& board);
 
 }  // namespace alidade

@@ -4,14 +4,14 @@
 
 namespace alidade {
 
-/// Stride along both axes that leaves some ten thousand pixels: enough for six weights and a median to 1 %.
+/// Stride along both axes that leaves about ten thousand pixels: enough for six weights and a median to 1 %.
 [[nodiscard]] Eigen::Index stride_of(Eigen::Index num_pixels);
 
-/// By a Gaussian of 1 px, the width of a small spot.
+/// Smooths with a Gaussian of 1 px, the width of a small spot.
 [[nodiscard]] Image smoothed_image(const Image& image);
 
-/// The noise of `detected`: of a pixel, of sums over pixels whose noise is alike, what compression leaves, and what
-/// remains at edges.
+/// The noise of `detected`: of a pixel, of sums over pixels with correlated noise, the residual of compression, and the
+/// residual at edges.
 void measure_noise(SpotSignal& signal);
 
 }  // namespace alidade

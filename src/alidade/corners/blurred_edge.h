@@ -4,13 +4,13 @@
 
 namespace alidade {
 
-/// Floats side by side; the compiler turns their arithmetic into vector instructions of any target.
+/// A vector of floats; the compiler turns their arithmetic into vector instructions of any target.
 using Float4 [[gnu::vector_size(16)]] = float;
 using Float8 [[gnu::vector_size(32)]] = float;
 template <class Floats>
 using IntsOf = decltype(Floats{} < Floats{});
 
-// All that follows is inlined, so that it is compiled for the processor that its caller is compiled for.
+// The following functions are inlined, so that they are compiled for the same processor as their caller.
 
 /// 2ˣ for -126 ≤ x ≤ 0, relative error < 2e-7 (Taylor of degree 6 on [-½, ½]).
 template <class Floats>
@@ -27,7 +27,7 @@ template <class Floats>
   result = power * mantissa;
 }
 
-/// erf(z) and exp(-z²), the edge's profile and its slope; erf to 2e-7.
+/// erf(z) and exp(-z²), the profile of the edge and its slope; erf to 2e-7.
 /// Abramowitz & Stegun, "Handbook of Mathematical Functions", 1964, 7.1.26.
 template <class Floats>
 struct EdgeProfile {

@@ -15,18 +15,18 @@ class Mat;
 
 namespace alidade {
 
-/// Position in a grid: (i, j) counts along its first and second direction, from anywhere.
+/// Position in a grid: (i, j) counts along its first and second direction, from an arbitrary origin.
 using GridCell = std::pair<int, int>;
 
-/// A corner of a grid and the steps to its neighbours at (i + 1, j) and (i, j + 1), as far as known there.
+/// A corner of a grid and the steps to its neighbours at (i + 1, j) and (i, j + 1), as far as known.
 struct GridCorner {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   Eigen::Vector2d step_i = Eigen::Vector2d::Zero(), step_j = Eigen::Vector2d::Zero();
   float middle = 0.0f, contrast = 0.0f;  ///< Of its saddle point.
 };
 
-/// Saddle points that lie like the inner corners of a chessboard. Right-handed as seen: j turns right from i. The
-/// square from corner (i, j) to (i + 1, j + 1) is bright where i + j is even.
+/// Saddle points arranged like the inner corners of a chessboard. Right-handed in the image: j is 90° clockwise of i.
+/// The square from corner (i, j) to (i + 1, j + 1) is bright if i + j is even.
 struct CornerGrid {
   std::map<GridCell, GridCorner> corners;
   [[nodiscard]] const GridCorner* at(int i, int j) const {
@@ -43,12 +43,12 @@ struct GridExtent {
 };
 [[nodiscard]] GridExtent extent_of(const CornerGrid& grid);
 
-/// Where the corner (i, j) should be, from its neighbours in the grid. None without three of them in a row or a square.
+/// Predicted position of corner (i, j) from its neighbours in the grid; none without three of them in a row or square.
 [[nodiscard]] std::optional<GridCorner> predict_corner(const CornerGrid& grid, int i, int j);
 
-/// Grows grids from every four saddle points that form a square of a chessboard, its eight neighbours of the right
-/// colours, each by local prediction, so that strong tilt and distortion do no harm. Largest first; grids of fewer than
-/// six corners are rejected. `image` is the one in which the points were found.
+/// Grows grids from every four saddle points that form a square of a chessboard with eight neighbours of the right
+/// colours, each by local prediction, so that strong tilt and distortion do no harm. Largest first; grids with fewer
+/// than six corners are rejected. `image` is the one in which the points were detected.
 [[nodiscard]] std::vector<CornerGrid> grow_grids(const cv::Mat& image, std::span<const SaddlePoint> points);
 
 }  // namespace alidade

@@ -15,20 +15,20 @@ struct PhotoSize {
   int width_px = 0, height_px = 0;
 };
 
-/// The boards of many photos, in the photos' order, with the size of every photo (0×0 where it could not be read).
+/// The boards of many photos, in the order of the photos, with the size of every photo (0×0 if it could not be read).
 struct BoardDetections {
   std::vector<BoardDetection> photos;
   std::vector<PhotoSize> sizes;
 };
 
-/// Finds the board in every photo, on all cores that TBB is allowed; the answer does not depend on their number. Only
-/// as many photos as there are threads are in memory at a time. Throws Interrupted when `progress` says stop.
+/// Detects the board in every photo, on all cores available to TBB; the result does not depend on their number. Only
+/// as many photos as there are threads are in memory at a time. Throws Interrupted if `progress` returns false.
 [[nodiscard]] BoardDetections find_boards(std::size_t num_photos, const PhotoLoader& load_photo, const Board& board,
                                           bool reject_partial = false, const Progress& progress = {});
 
-/// A board's pose by a first calibration, for the second extraction. Photos without one are left alone.
+/// A board's pose from a first calibration, for the second extraction. Photos without one are skipped.
 struct KnownBoard {
-  const BoardView* first = nullptr;  ///< As found before; null: leave this photo alone.
+  const BoardView* first = nullptr;  ///< As found before; null: skip this photo.
   Rigid3 cam_from_board;
 };
 

@@ -14,17 +14,17 @@ class Mat;
 
 namespace alidade {
 
-/// A board as a first look finds it, in a fraction of the time that find_board() takes.
+/// A board from a quick search, in a fraction of the time of find_board().
 struct QuickLook {
-  BoardView view;        ///< Corners to about a tenth of a pixel; empty where the board was not found.
-  double blur_px = 0.0;  ///< Median σ of the blur of a few corners; 0: not known (boards without crossing edges).
-  std::string reason;    ///< Why there is none; empty where there is.
-  std::pair<int, int> other_grid = {0, 0};  ///< Columns and rows of a chessboard of another size; zeros: none.
+  BoardView view;        ///< Corners to about a tenth of a pixel; empty if the board was not found.
+  double blur_px = 0.0;  ///< Median σ of the blur at a few corners; 0: unknown (boards without crossing edges).
+  std::string reason;    ///< Why there is none; empty if there is one.
+  std::pair<int, int> other_grid = {0, 0};  ///< Columns and rows of a detected chessboard of another size; zeros: none.
   [[nodiscard]] bool found() const { return reason.empty(); }
 };
 
-/// Searches a board in consecutive images of a video: first around its last position, then everywhere; above two
-/// megapixels in a reduced image. Keeps the board's last position.
+/// Searches for a board in consecutive images of a video: first around its last position, then everywhere; above two
+/// megapixels in a reduced image. Keeps the last position of the board.
 class QuickLooker {
  public:
   explicit QuickLooker(const Board& board) : board_(board) {}

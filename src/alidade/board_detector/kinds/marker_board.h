@@ -5,16 +5,16 @@
 
 namespace alidade {
 
-/// Finds a charuco board or an aprilgrid, whole or in part: its markers say where its points are about, fit_corner()
-/// where exactly and how well. A point is taken only if its two edges look as they must there. `photo` is one channel
-/// of 32-bit float, 0 to 255. Aprilgrids need the black squares between the tags that Kalibr's target has.
+/// Detects a charuco board or an aprilgrid, whole or in part: its markers give the approximate positions of its points,
+/// fit_corner() the accurate ones with their covariance. A point is accepted only if its two edges look as expected.
+/// `photo` is one channel of 32-bit float, 0 to 255. Aprilgrids need the black squares between tags of Kalibr's target.
 [[nodiscard]] BoardDetection find_marker_board(const cv::Mat& photo, const Board& board);
 
-/// Fits the points of the board again where lens and pose are known, those that the first search missed as well.
+/// Fits the points of the board again with known lens and pose, including those that the first search missed.
 [[nodiscard]] BoardDetection refind_marker_board(const cv::Mat& photo, const Board& board, const BoardView& first,
                                                  const Camera& camera, const Rigid3& cam_from_board);
 
-/// How many different markers of a dictionary a photo shows, wherever they stand.
+/// Number of different markers of a dictionary in a photo, wherever they are.
 [[nodiscard]] std::size_t count_markers(const cv::Mat& photo, const std::string& dictionary);
 
 }  // namespace alidade

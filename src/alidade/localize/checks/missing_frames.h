@@ -7,11 +7,11 @@
 
 namespace alidade {
 
-/// Missing frames of a constant rate, not shown by the times: the camera moves further between two frames than before
-/// and after, in all six components by as much as in two, three … periods. Model: poses around the step are a
-/// polynomial of time, with errors of one unknown variance per component; likelihood ratio of a longer step: ν
-/// log(S₁/S_m), summed over the components. Patterns: frame_pattern.h. Empty if frames have no usual period.
-/// every few frames are missing, frame_pattern.h says it. Nothing where frames have no usual period.
+/// Missing frames of a constant rate, although the times claim that there are none: the camera moves further between
+/// two frames than before and after, in all six components by as much as in two, three … periods. Model: poses around
+/// the step are a polynomial of time, with errors of one unknown variance per component; the likelihood ratio of a
+/// longer step is ν log(S₁/S_m), summed over the components. If some of every few frames are missing, frame_pattern.h
+/// detects it. Empty if frames have no usual period.
 struct FoundMissing {
   std::vector<MissingFrames> frames;  ///< In order of time.
   std::vector<int> pattern;           ///< Repeating steps in periods; empty: none.

@@ -108,7 +108,7 @@ void LocalizationFilter::keep_consensus() {
     best = cost;
     agrees_best_ = agrees_;
   }
-  if (agrees_best_.size() != waiting_.size()) return;  // nothing finite
+  if (agrees_best_.size() != waiting_.size()) return;  // no finite cost
   std::size_t kept = 0;
   for (std::size_t k = 0; k < waiting_.size(); ++k) {
     if (agrees_best_[k])

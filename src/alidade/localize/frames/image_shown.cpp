@@ -7,7 +7,7 @@
 #include "alidade/localize/frames/image_localizer.h"
 #include "alidade/localize/frames/image_mask.h"
 
-// Where images show the scene, and when.
+// Which part of the images shows the scene, and which images are new.
 
 namespace alidade {
 

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-/// F of Singer's model: the acceleration decays with τ.
+/// F of Singer's model: the acceleration decays with time constant τ.
 Eigen::Matrix3d singer_transition(double tau_s, double dt_s) {
   const double a = dt_s / tau_s, decay = std::exp(-a);
   Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
@@ -22,7 +22,7 @@ Eigen::Matrix3d singer_transition(double tau_s, double dt_s) {
 Eigen::Matrix3d singer_noise(double tau_s, double dt_s) {
   const double a = dt_s / tau_s, tau2 = tau_s * tau_s, e = std::exp(-a), e2 = std::exp(-2.0 * a);
   Eigen::Matrix3d Q;
-  if (a < 1e-2) {  // the closed form loses its digits to cancellation; leading terms
+  if (a < 1e-2) {  // the closed form suffers from cancellation: leading terms of its series
     const double q = 2.0 / tau_s;
     Q << q * std::pow(dt_s, 5) / 20.0, q * std::pow(dt_s, 4) / 8.0, q * std::pow(dt_s, 3) / 6.0, 0.0,
         q * std::pow(dt_s, 3) / 3.0, q * dt_s * dt_s / 2.0, 0.0, 0.0, q * dt_s;
@@ -35,7 +35,7 @@ Eigen::Matrix3d singer_noise(double tau_s, double dt_s) {
   return Q;
 }
 
-/// What the models share of one step in time.
+/// The matrices of one time step that all models share.
 struct SingerStep {
   Eigen::Matrix3d F = Eigen::Matrix3d::Identity(), Q = Eigen::Matrix3d::Zero();
 
@@ -65,13 +65,13 @@ void BearingAxis::start(double t_s, double angle_rad, double variance_rad2, cons
   t_s_ = t_s;
   for (std::size_t i = 0; i < num_agilities; ++i) {
     const double sigma = config_.sigma_rad_s2[i];
-    // What a model's accelerations make of a rate in their time; the most manoeuvring may have any.
+    // The rate that a model's acceleration reaches within its time constant; the most manoeuvring model may have any.
     const double rate = i + 1 == num_agilities ? config_.start_rate_rad_s
                                                : std::min(config_.start_rate_rad_s, sigma * config_.singer_tau_s);
-    beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump no rate or acceleration is assumed
+    beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump, no rate or acceleration is assumed
     beliefs_[i].P = Eigen::Vector3d(variance_rad2 + effect.squaredNorm(), rate * rate, sigma * sigma).asDiagonal();
     with_lens_[i].setZero();
-    with_lens_[i].row(0) = -effect;  // state − belief: what the observation has too much
+    with_lens_[i].row(0) = -effect;  // error of the state minus belief: the excess of the observation
   }
   log_weights_.fill(0.0);
   weights_.fill(1.0 / num_agilities);
@@ -88,7 +88,7 @@ void BearingAxis::update(double t_s, double angle_rad, double variance_rad2, con
   for (std::size_t i = 0; i < num_agilities; ++i) {
     Belief<3> belief = step.predicted(beliefs_[i], config_.sigma_rad_s2[i]);
     const Eigen::Matrix<double, 3, 2> with_lens = step.F * with_lens_[i];
-    // z = angle + effect u + n: the lens' errors u are not estimated, what they share with the state is kept.
+    // z = angle + effect u + n: the lens errors u are not estimated, but their covariance with the state is kept.
     const Eigen::Vector3d PHt = belief.P.col(0) + with_lens * effect.transpose();
     const Eigen::RowVector2d CHt = with_lens.row(0) + effect;
     const double nu = angle_rad - belief.x[0], S = PHt[0] + effect.dot(CHt) + variance_rad2;

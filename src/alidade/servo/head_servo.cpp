@@ -11,7 +11,7 @@ std::string_view servo_event_name(ServoEvent event) {
   return names[static_cast<std::size_t>(event)];
 }
 
-// fx, fy, cx, cy come first in every model.
+// In every lens model fx, fy, cx, cy come first.
 Eigen::Vector2d centre_of(const Camera& camera) { return params(camera.lens).segment<2>(2); }
 double focal_of(const Camera& camera) { return params(camera.lens).head<2>().mean(); }
 
@@ -32,7 +32,7 @@ std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadObservation& obse
   if (!ray) return std::nullopt;
   auto bearing = aim(head_.head, ray->origin_in_world + config_.range_m * ray->direction_in_world);
   if (!bearing) return std::nullopt;
-  for (int axis = 0; axis < 2; ++axis) {  // on the spiral turn of the head
+  for (int axis = 0; axis < 2; ++axis) {  // on the same revolution as the head
     double& angle = (*bearing)[axis];
     angle =
         observation.pan_tilt_rad[axis] + std::remainder(angle - observation.pan_tilt_rad[axis], 2.0 * std::numbers::pi);
@@ -40,7 +40,7 @@ std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadObservation& obse
   return bearing;
 }
 
-/// bearing = reading − (px − c) / f: by a σ of f, and by one of c.
+/// bearing = reading − (px − c) / f: effects of one σ of f and of one σ of c.
 std::array<LensEffect, 2> HeadServo::lens_effects(const HeadObservation& observation) const {
   std::array<LensEffect, 2> effects{LensEffect::Zero(), LensEffect::Zero()};
   if (!observation.lens) return effects;
@@ -64,7 +64,7 @@ ObservationUse HeadServo::take(const HeadObservation& observation) {
   return use;
 }
 
-/// Uses the image and says what became of the target.
+/// Processes the image, and returns the event of the target.
 ServoEvent HeadServo::follow(const HeadServoInput& input) {
   if (input.observation) {
     if (is_lost_) filter_.forget();

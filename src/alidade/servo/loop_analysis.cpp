@@ -23,7 +23,7 @@ Complex open_loop(const ServoPlant& plant, const PiGains& gains, double omega) {
   return (gains.kp + gains.ki / s) * G;
 }
 
-/// Roots of τ s² + (1 + g kp) s + g ki (of a rate plant: one more integration).
+/// Roots of τ s² + (1 + g kp) s + g ki (for a rate plant with one more integration).
 std::vector<Complex> poles_of(const ServoPlant& plant, const PiGains& gains) {
   const double g = gain_of(plant);
   std::vector<double> rising{g * gains.ki, g * gains.kp};
@@ -42,7 +42,7 @@ std::vector<Complex> poles_of(const ServoPlant& plant, const PiGains& gains) {
   return poles;
 }
 
-/// Between two frequencies on different sides of a level.
+/// Bisection between two frequencies on different sides of a level.
 double where_it_passes(const std::function<double(double)>& size, double level, double low, double high) {
   const bool falls = size(high) < level;
   for (int k = 0; k < 60; ++k) {
@@ -52,7 +52,7 @@ double where_it_passes(const std::function<double(double)>& size, double level, 
   return low;
 }
 
-/// Where a size falls through a level, at the highest frequency of `lowest` to `highest`; 0 where it never does.
+/// The highest frequency from `lowest` to `highest` at which a magnitude falls below a level; 0 if there is none.
 double falls_through(const std::function<double(double)>& size, double level, double lowest, double highest) {
   constexpr int steps = 2000;
   const auto frequency = [&](int i) { return lowest * std::pow(highest / lowest, static_cast<double>(i) / steps); };
@@ -75,7 +75,7 @@ ContinuousLoop continuous_loop(const ServoPlant& plant, const PiGains& gains) {
   return result;
 }
 
-/// The loop at z = exp(jωT), its whole periods of delay apart: their phase goes round and round.
+/// The loop at z = exp(jωT), with its whole periods of delay kept separate, whose phase wraps around many times.
 class SampledLoop {
  public:
   SampledLoop(const SampledAxis& axis, const PiGains& gains, double period_s, int delay_samples)
@@ -97,8 +97,8 @@ class SampledLoop {
   int delay_samples_;
 };
 
-/// Bandwidth, and the least phase margin of all crossovers; the phase is followed from low frequencies on, where it is
-/// between −360° and 0.
+/// Bandwidth, and the smallest phase margin of all crossovers; the phase is unwrapped from low frequencies on, where it
+/// is between −360° and 0.
 void add_margins(const SampledLoop& loop, double period_s, LoopAnalysis& result) {
   constexpr int steps = 2000;
   const double lowest = 1e-7 / period_s, highest = std::numbers::pi / period_s;
@@ -124,13 +124,13 @@ void add_margins(const SampledLoop& loop, double period_s, LoopAnalysis& result)
   }
 }
 
-/// State: angle, rate, lagged command, integral, last command, errors on their way (newest first). Of delays the sum
-/// counts alone.
+/// State: angle, rate, lagged command, integral, last command,
+/// delayed errors (newest first). Only the sum of the delays matters.
 double sampled_radius(const SampledAxis& axis, const PiGains& gains, double period_s, int delay_samples) {
   constexpr Eigen::Index integral = 3, last = 4, first_error = 5;
   const Eigen::Index size = first_error + delay_samples;
   Eigen::MatrixXd next = Eigen::MatrixXd::Zero(size, size);
-  Eigen::RowVectorXd error = Eigen::RowVectorXd::Zero(size);  // as the controller sees it
+  Eigen::RowVectorXd error = Eigen::RowVectorXd::Zero(size);  // as the controller receives it
   if (delay_samples == 0)
     error[0] = -1.0;
   else

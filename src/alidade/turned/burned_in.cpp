@@ -18,7 +18,7 @@ Cell cell_of(const Eigen::Vector2d& px) {
   return {static_cast<int>(std::floor(px.x() / place_px)), static_cast<int>(std::floor(px.y() / place_px))};
 }
 
-/// Calls visit(place) for the pixel's place and those about it.
+/// Calls visit(cell) for the pixel's cell and the eight around it.
 template <typename Visit>
 void about(const Eigen::Vector2d& px, const Visit& visit) {
   const Cell at = cell_of(px);
@@ -31,7 +31,7 @@ const Eigen::Vector2d& pixel_of(const MatchedPhotos& photos, int photo, int feat
   return photos.features[static_cast<std::size_t>(photo)][static_cast<std::size_t>(feature)];
 }
 
-/// Places where features stay though their pair's homography moves them, and the photos that show it.
+/// Cells whose features stay although the homography of their pair moves them, and the photos that show it.
 std::map<Cell, std::set<int>> contradicted(const std::vector<PhotoLink>& links, const MatchedPhotos& photos) {
   const PhotoScale scale(photos);
   std::map<Cell, std::set<int>> seen;

@@ -10,16 +10,16 @@
 namespace alidade {
 namespace {
 
-constexpr double spread = 0.004;  // of a match's misfit, half widths: lens and hand included
+constexpr double spread = 0.004;  // of a match's residual, half widths: includes distortion and hand motion
 constexpr double truncate_at = 9.0;
-constexpr double better = 0.99;  // of the cost
+constexpr double better = 0.99;  // share of the cost
 
-/// A link's matches that agree, thinned.
+/// The inliers of a link, thinned.
 struct LinkPoints {
   std::vector<Eigen::Vector2d> a, b;
 };
 
-/// As pixels whose height is `aspect` times their width put them, were they square.
+/// Normalised points, with y divided by `aspect` so that pixels become square.
 LinkPoints points_of(const MatchedPhotos& photos, const PhotoLink& link, double aspect) {
   constexpr std::size_t max_points = 100;
   const PhotoScale scale(photos);
@@ -45,7 +45,7 @@ struct Turn {
   double cost = 0.0;
 };
 
-/// The rotation between both sets of rays, robust: weights that fall with the misfit.
+/// Robust rotation between both sets of rays: iteratively reweighted by the residuals.
 Turn robust_turn(const LinkPoints& points, double focal) {
   const auto ray = [focal](const Eigen::Vector2d& q) { return Eigen::Vector3d(q.x() / focal, q.y() / focal, 1.0); };
   std::vector<double> weights(points.a.size(), 1.0);
@@ -74,7 +74,7 @@ Turn robust_turn(const LinkPoints& points, double focal) {
 
 std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links, double aspect,
                                      std::size_t most) {
-  constexpr std::size_t max_links = 60;  // determine the focal length; the rotations come from all
+  constexpr std::size_t max_links = 60;  // suffice for the focal length; rotations are estimated for all links
   std::vector<LinkPoints> points;
   for (const PhotoLink& link : links) points.push_back(points_of(photos, link, aspect));
   const std::size_t step = (links.size() + max_links - 1) / max_links;

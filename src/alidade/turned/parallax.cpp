@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A match's misfit in photo b, and how a step of the camera along x, y, z would move the point there.
+/// Residual of a match in photo b, and its derivative by a translation of the camera along x, y, z.
 struct Misfit {
   Eigen::Vector2d px, residual;
   Eigen::Matrix<double, 2, 3> by_step;
@@ -16,7 +16,7 @@ struct Misfit {
 
 using PairMisfits = std::map<std::pair<int, int>, std::vector<Misfit>>;
 
-/// Of the tracks' neighbouring observations.
+/// For each pair of photos, from the tracks that both observe.
 PairMisfits misfits_of(const TurnedFit& fit) {
   PairMisfits misfits;
   const TurnedBundle& bundle = fit.bundle;
@@ -37,7 +37,7 @@ PairMisfits misfits_of(const TurnedFit& fit) {
   return misfits;
 }
 
-/// Directions spread evenly over half a sphere (Fibonacci's lattice).
+/// Directions spread evenly over a hemisphere (Fibonacci lattice).
 std::vector<Eigen::Vector3d> directions() {
   constexpr int count = 200;
   std::vector<Eigen::Vector3d> all;
@@ -50,7 +50,7 @@ std::vector<Eigen::Vector3d> directions() {
 }
 
 struct Anisotropy {
-  double z = 0.0, excess = 0.0;  ///< In its σ; mean square along less that across.
+  double z = 0.0, excess = 0.0;  ///< Score in σ; mean square along the lines minus that across.
 };
 
 Anisotropy along_lines(const std::vector<Misfit>& misfits, const Eigen::Vector3d& step) {
@@ -66,7 +66,7 @@ Anisotropy along_lines(const std::vector<Misfit>& misfits, const Eigen::Vector3d
   return {sum / std::sqrt(0.5 * fourth), sum / static_cast<double>(misfits.size())};
 }
 
-/// A sum of products that are zero in the mean, in its σ by their squares.
+/// A sum of products with zero mean, and its score in σ estimated from their squares.
 struct Products {
   double sum = 0.0, squares = 0.0;
   void add(double product) {
@@ -76,8 +76,8 @@ struct Products {
   [[nodiscard]] double z() const { return squares > 0.0 ? sum / std::sqrt(squares) : 0.0; }
 };
 
-/// Do neighbours in a photo have misfits alike? Most are of one surface, thus at one distance; their noise is
-/// independent, whatever its direction, unless they are so close that they share their image.
+/// Score of the correlation between residuals of neighbours in a photo. Most neighbours are on one surface and thus at
+/// one distance; their noise is independent in any direction, unless they are so close that they share image content.
 double of_neighbours(std::vector<Misfit> misfits) {
   constexpr double closest = 0.025, farthest = 0.1;  // half widths
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -93,7 +93,7 @@ double of_neighbours(std::vector<Misfit> misfits) {
   return products.z();
 }
 
-/// How far each residual moves its ray in the world, least.
+/// The smallest shift of each ray, in the world frame, that explains its residual.
 Eigen::Matrix3Xd ray_shifts(const TurnedFit& fit) {
   const TurnedBundle& bundle = fit.bundle;
   Eigen::Matrix3Xd shifts = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(bundle.observations.size()));
@@ -110,8 +110,8 @@ Eigen::Matrix3Xd ray_shifts(const TurnedFit& fit) {
   return shifts;
 }
 
-/// Do two pairs of photos that share none see a point's distance alike, by the lever between the camera's centre and
-/// that of its rotations? The noise of the pairs is independent, even of one point.
+/// Score of the agreement of two disjoint pairs of photos on the distance of a point, from the lever between
+/// camera centre and rotation centre. The noise of such pairs is independent, even for a single point.
 double of_one_lever(const TurnedFit& fit) {
   const std::vector<TurnedDetection>& seen = fit.bundle.observations;
   const Eigen::Matrix3Xd shifts = ray_shifts(fit);
@@ -119,7 +119,7 @@ double of_one_lever(const TurnedFit& fit) {
   for (std::size_t begin = 0, end = 0; begin < seen.size(); begin = end) {
     while (end < seen.size() && seen[end].track == seen[begin].track) ++end;
     if (end - begin < 4) continue;
-    // of the pairs' levers h: Σ h_p·h_q over those that share no photo, by what all sum to and what those of a photo do
+    // with the pairs' levers h: Σ h_p·h_q over pairs that share no photo, from the sum of all and the sums per photo
     Eigen::Matrix3Xd of_photo = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(end - begin));
     double squares = 0.0;
     for (std::size_t i = begin; i < end; ++i) {
@@ -168,14 +168,14 @@ ParallaxTest parallax_of(const TurnedFit& fit) {
     test.photo_b = photos.second;
   }
   if (!(count > 0.0)) return test;
-  // a match is sure across an edge and not along it: so is its noise, which nothing else agrees with
-  constexpr double surely = 3.3, surely_of_pairs = 4.5;  // of one test, of the pairs' largest
+  // a match is precise across an edge but not along it: such directional noise does not agree with anything else
+  constexpr double surely = 3.3, surely_of_pairs = 4.5;  // for one test, for the largest of the pairs
   const double of_lever = of_one_lever(fit);
   if (of_lever < surely && agree < surely_of_pairs) test.z = std::min(test.z, std::max(of_lever, agree));
-  test.rms_px = std::sqrt(squares / count);  // normalised: the caller knows the scale
+  test.rms_px = std::sqrt(squares / count);  // normalised: the caller converts it
   const double focal = 0.5 * (fit.bundle.camera[0] + fit.bundle.camera[1]);
-  // observable is the scatter of the points' inverse distances, typically half their mean; the mean looks like a
-  // longer lens
+  // only the scatter of the points' inverse distances is observable, typically half their mean; the mean acts like a
+  // longer focal length
   constexpr double mean_over_scatter = 2.0;
   test.relative = turns > 0.0 ? mean_over_scatter * std::sqrt(squares / turns) / focal : 0.0;
   return test;

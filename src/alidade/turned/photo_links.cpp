@@ -12,10 +12,10 @@ namespace {
 
 constexpr std::size_t min_inliers = 8;
 constexpr double min_share = 0.1;
-constexpr double agree_within = 0.0022, agree_within_px = 1.5;  // of the width; the lens distorts, hands shake
+constexpr double agree_within = 0.0022, agree_within_px = 1.5;  // of the width; for distortion and hand motion
 constexpr double same_within_px = 0.05;
 
-/// The homography that most matches agree on.
+/// The homography on which most matches of a pair agree.
 PhotoLink link_of_pair(const MatchedPhotos& photos, std::size_t index) {
   const MatchedPair& pair = photos.pairs[index];
   PhotoLink link{pair.photo_a, pair.photo_b, index, {}, Eigen::Matrix3d::Identity(), false};
@@ -39,7 +39,7 @@ PhotoLink link_of_pair(const MatchedPhotos& photos, std::size_t index) {
   try {
     H = cv::findHomography(a, b, cv::RANSAC, threshold, fits, 4000, 0.9995);
   } catch (const cv::Exception&) {
-    return link;  // points that stand on one line
+    return link;  // collinear points
   }
   if (H.empty()) return link;
   for (int i = 0; i < 3; ++i) {
@@ -85,7 +85,7 @@ PhotoTree largest_tree(std::size_t num_photos, const std::vector<PhotoLink>& lin
     if (root < 0) break;
     PhotoTree tree{{root}, {-1}};
     is_done[static_cast<std::size_t>(root)] = true;
-    for (;;) {  // Prim's: the strongest link that leads out
+    for (;;) {  // Prim's algorithm: the strongest link that leads out
       int best = -1;
       for (std::size_t i = 0; i < links.size(); ++i) {
         const auto inside = [&](int photo) { return std::ranges::find(tree.photos, photo) != tree.photos.end(); };

@@ -10,13 +10,13 @@ namespace {
 
 using Camera6 = TurnedCamera;
 
-/// The part above zero.
+/// Projection on the positive semidefinite matrices.
 TurnedInformation positive_part(const TurnedInformation& M) {
   const SymmetricEigen eigen = symmetric_eigen(Eigen::MatrixXd(0.5 * (M + M.transpose())));
   return eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }
 
-/// The model's covariance and what the photos scatter beyond it; whitened by the model's.
+/// Covariance of the model plus the excess scatter of the photos, whitened by the model's.
 TurnedInformation with_scatter(const TurnedInformation& seen, const TurnedInformation& expected, double n,
                                const ScatterCovariance& scatter) {
   const double shrink = std::min(1.0, 8.0 / n);
@@ -44,7 +44,7 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
     report_progress(progress, "held-out photos", k, count);
     const TurnedNormal without = turned_normal(fit.bundle, fit.prior, fit.solve, static_cast<int>(k));
     Eigen::MatrixXd information = without.information;
-    information.diagonal().array() += 1e-6;  // a photo that nothing joins any more may rotate freely
+    information.diagonal().array() += 1e-6;  // a photo without links may rotate freely
     const Eigen::MatrixXd cov_without = inverse_symmetric(information);
     const Camera6 change = root.whitened(Camera6(-(cov_without * without.gradient).head<num_camera>()));
     seen += change * change.transpose();

@@ -9,7 +9,7 @@ namespace {
 
 using Node = std::pair<int, int>;  // photo, feature
 
-/// Sets of features that are one point, each photo once in a set.
+/// Disjoint sets of features that belong to one point, at most one per photo.
 class FeatureSets {
  public:
   bool join(const Node& a, const Node& b) {
@@ -40,7 +40,7 @@ class FeatureSets {
   std::vector<std::vector<Node>> members_;
 };
 
-/// The mean direction in which the observations of [first, last) say that their point is; zero where one has no ray.
+/// Mean direction of a point from the observations [first, last); zero if one of them has no ray.
 Eigen::Vector3d mean_ray(const TurnedBundle& bundle, std::size_t first, std::size_t last) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = first; i < last; ++i) {

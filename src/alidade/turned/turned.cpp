@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t min_photos = 3;
 constexpr double ordinary_parallax = 0.003;  // 5 mm of lever at 1.7 m, 5 cm at 17 m
-constexpr double zoom_is_other = 0.02;       // a photo's focal length differs by so much: not the camera of the others
+constexpr double zoom_is_other = 0.02;       // relative difference of a photo's focal length: zoomed if above
 
 double angle_of(const Eigen::Matrix3d& R) { return std::acos(std::clamp(0.5 * (R.trace() - 1.0), -1.0, 1.0)); }
 
@@ -46,7 +46,7 @@ class TurnedRun {
   }
 
  private:
-  /// An image that is there twice says nothing the second time, and says it without noise.
+  /// Removes repeated images: the copy adds no information, and its matches have no noise.
   void leave_out_same_images() {
     std::vector<bool> is_same(photos_.names.size(), false);
     for (const PhotoLink& link : links_) {
@@ -96,7 +96,7 @@ class TurnedRun {
     fit_ = std::move(fits[best]);
   }
 
-  /// Images that were squeezed, whose pixels no prior about one may hold: true where their fits are far better.
+  /// For squeezed images, for which a prior on square pixels is wrong: true if fits with another aspect are far better.
   bool try_other_aspect(std::vector<TurnedFit>& fits, std::size_t& best) {
     TurnedConfig config = free_;
     config.aspect = likely_aspect(photos_, links_);
@@ -117,11 +117,11 @@ class TurnedRun {
     return true;
   }
 
-  /// Were some photos zoomed? From the homographies alone, which hold for a camera that zooms as well.
+  /// Tests whether some photos were zoomed, from the homographies alone, which also hold for a zooming camera.
   bool zooms_differ(const std::vector<FocalStart>& starts) {
     if (starts.empty()) return false;
     TurnedConfig config = free_;
-    config.ordinary_aspect = config.ordinary_centre = true;  // what is free would be hidden in a zoom
+    config.ordinary_aspect = config.ordinary_centre = true;  // otherwise, free parameters would be confused with zoom
     TurnedFit zoomed = fit_turned(photos_, links_, tree_, starts.front(), config, true, progress_);
     if (!std::isfinite(zoomed.solution.cost) || freedom_of(zoomed.bundle) < 1.0) return false;
     const ZoomTest test = free_zooms(zoomed, progress_);
@@ -209,7 +209,7 @@ class TurnedRun {
     for (const PhotoLink& link : links_) report_.matches.given += photos_.pairs[link.pair].matches.size();
   }
 
-  /// With the terms of the lens that differ significantly from zero; the others' uncertainty is still included.
+  /// Covariance with the lens terms that differ significantly from zero; the uncertainty of the others is included.
   void state_covariance() {
     if (!config_.keeps_terms) {
       free_.lens_terms = num_radial;
@@ -244,18 +244,18 @@ class TurnedRun {
     add_given();
   }
 
-  /// Significantly, and by no more than lenses are: what moves, or zooms, may look like a lens that no one makes.
+  /// Whether p1, p2 are significant and plausible for a lens: motion or zoom may imitate a lens that does not exist.
   [[nodiscard]] bool is_decentred(const ScatterCovariance& scatter) const {
     const Eigen::Matrix2d cov = scatter.cov.block<2, 2>(decentring_place, decentring_place);
     const Eigen::Vector2d p = fit_.bundle.camera.segment<2>(decentring_place);
-    constexpr double most = 5e-3, both = 1.31;  // five of ordinary lenses' σ; χ² of two as unlikely as 3² of one
+    constexpr double most = 5e-3, both = 1.31;  // five σ of typical lenses; χ² of two as improbable as 3² of one
     const double as_likely =
         std::max(three_sigma_of(decentring_place, scatter), three_sigma_of(decentring_place + 1, scatter));
     return p.dot(cov.inverse() * p) > both * as_likely * as_likely && p.norm() < most;
   }
 
-  /// With fewer terms. σ includes theirs, and the change of the answer when they are estimated: either may be the right
-  /// lens.
+  /// Refits with fewer lens terms. σ includes the uncertainty of the dropped ones and the change of the answer: either
+  /// lens may be correct.
   void drop(int lens_terms, bool decentred, ScatterCovariance& scatter) {
     std::vector<int> dropped(radial_places.begin() + lens_terms, radial_places.begin() + free_.lens_terms);
     if (free_.decentred && !decentred) dropped.insert(dropped.end(), {decentring_place, decentring_place + 1});
@@ -270,7 +270,7 @@ class TurnedRun {
     scatter = scatter_covariance(fit_, progress_);
   }
 
-  /// Would k4 be needed as well? Then k1 to k3 do not describe the lens, and how it changes the answer is counted.
+  /// Tests whether k4 is significant as well: then k1 to k3 do not describe the lens, and its effect is included in σ.
   void test_further_term() {
     TurnedConfig further = free_;
     ++further.lens_terms;
@@ -282,7 +282,7 @@ class TurnedRun {
     report_.lens_departs = moved[0] / fit_.bundle.camera[0];
   }
 
-  /// The camera in pixels; what a normalised unit of each parameter is.
+  /// Sets the camera in pixels; returns the size of the normalised unit of each parameter.
   TurnedCamera note_camera() {
     TurnedCamera unit = TurnedCamera::Ones();
     unit.head<4>().setConstant(scale_.half_width_px);
@@ -291,8 +291,8 @@ class TurnedRun {
     return unit;
   }
 
-  /// Assumptions that may change the answer: the centre's translations as the camera rotated. A centre that is
-  /// ρ of the points' distance before the axes sees tan θ (1 + ρ / cos θ) for tan θ: f grows by ρ f, k1 by ρ/2, k2 by
+  /// Assumptions that may change the answer: translation of the camera centre with rotation. A centre at ρ times the
+  /// points' distance in front of the axes sees tan θ (1 + ρ / cos θ) for tan θ: f grows by ρ f, k1 by ρ/2, k2 by
   /// −ρ/8; one beside them shifts cx, cy by ρ f.
   void add_given() {
     const Eigen::Vector2d f = report_.camera.head<2>();
@@ -322,7 +322,7 @@ class TurnedRun {
     return std::sqrt(slope.dot(report_.cov.topLeftCorner<2, 2>() * slope));
   }
 
-  /// The answer with the user's fixed values; their effect on it is included.
+  /// Refits with the parameters that the user fixes; the effect on the answer is included in σ.
   void hold() {
     const TurnedCamera free = report_.camera;
     report_.free_centre_px = free.segment<2>(2);
@@ -340,7 +340,7 @@ class TurnedRun {
     note_camera();
     const Eigen::Vector2d moved = report_.camera.head<2>() - free.head<2>();
     if (!config_.square_pixels) report_.cov.topLeftCorner<2, 2>() += moved * moved.transpose();
-    if (config_.square_pixels) {  // of (fx + fy) / 2, and how far off it each of them is
+    if (config_.square_pixels) {  // variance of (fx + fy) / 2, and of the deviation of each from it
       const double variance = report_.cov.topLeftCorner<2, 2>().mean() + 0.5 * moved.squaredNorm();
       report_.cov.topLeftCorner<2, 2>().setConstant(variance);
       report_.cov.row(1) = report_.cov.row(0);
@@ -358,7 +358,7 @@ class TurnedRun {
     report_.assumed.push_back(centre);
   }
 
-  /// Again with what one camera explains: focus that walks, a step forward.
+  /// Tests the zoom of each photo again with all matches that one camera explains: focus changes, a step forward.
   void test_photos_zooms() {
     const ZoomTest test = free_zooms(fit_, progress_);
     const double raise = std::sqrt(std::max(report_.design_effect, 1.0));
@@ -370,14 +370,14 @@ class TurnedRun {
 
   MatchedPhotos photos_;
   const TurnedConfig& config_;
-  TurnedConfig free_;  ///< With fixed values free within typical priors: a fixed value may be wrong.
+  TurnedConfig free_;  ///< With the fixed parameters free within typical priors, as a fixed value may be wrong.
   const Progress& progress_;
   PhotoScale scale_;
   TurnedReport report_;
   std::vector<PhotoLink> links_;
   PhotoTree tree_;
   TurnedFit fit_;
-  TurnedInformation by_lens_ = TurnedInformation::Zero();  ///< Covariance by the terms that are not estimated.
+  TurnedInformation by_lens_ = TurnedInformation::Zero();  ///< Covariance due to lens terms that are not estimated.
   std::size_t num_same_ = 0, num_agreeing_ = 0;
 };
 

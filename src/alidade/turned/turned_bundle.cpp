@@ -10,15 +10,15 @@
 namespace alidade {
 namespace {
 
-constexpr double fixed = 1e12;    // information of what is not estimated
-constexpr double outside = 30.0;  // σ that a point without a pixel counts for
+constexpr double fixed = 1e12;    // information of parameters that are not estimated
+constexpr double outside = 30.0;  // residual [σ] assigned to a point without a pixel
 
 using ByCamera = Eigen::Matrix<double, 2, num_camera>;
 using ByPhoto = Eigen::Matrix<double, 2, per_photo>;
 
-/// A track's part of the normal equations: its ray (two directions across it), and what that shares with the rest.
+/// Block of a track in the normal equations: its ray (two directions across it), and its coupling to the rest.
 struct TrackBlock {
-  std::size_t first = 0, last = 0;  ///< Its observations.
+  std::size_t first = 0, last = 0;  ///< Range of its observations.
   Eigen::Matrix<double, 3, 2> across;
   Eigen::Matrix2d information, inverse;
   Eigen::Vector2d gradient;
@@ -56,7 +56,7 @@ class TurnedSystem {
     }
   }
 
-  /// The reduced equations, with the diagonals raised by `damping`.
+  /// The reduced normal equations, with the diagonals multiplied by 1 + `damping`.
   [[nodiscard]] TurnedNormal reduced(double damping) {
     TurnedNormal normal{information_, gradient_};
     normal.information.diagonal() *= 1.0 + damping;
@@ -66,7 +66,7 @@ class TurnedSystem {
     return normal;
   }
 
-  /// Where the step leads; after reduced().
+  /// The bundle after a step; to be called after reduced().
   [[nodiscard]] TurnedBundle moved(const Eigen::VectorXd& step) const {
     TurnedBundle next = bundle_;
     next.camera += step.head<num_camera>();
@@ -87,8 +87,8 @@ class TurnedSystem {
   }
 
  private:
-  /// Zooms that are not estimated stay exactly: sure pixels in great number know them nearly as well as `fixed` does,
-  /// and would move them step by step.
+  /// Fixes zooms that are not estimated exactly: many precise pixels have nearly
+  /// as much information on them as `fixed`, and would move them step by step.
   void hold_zooms(TurnedNormal& normal) const {
     for (std::size_t k = 0; k < bundle_.cam_from_world.size(); ++k) {
       const auto at = place_of(static_cast<int>(k)) + 3;
@@ -107,7 +107,7 @@ class TurnedSystem {
     block.gradient.setZero();
     block.by_camera.setZero();
     for (std::size_t i = first; i < last; ++i) add_observation(i, ray, block);
-    block.information.diagonal().array() += 1e-9;  // an unobserved point stays where it is
+    block.information.diagonal().array() += 1e-9;  // keeps an unobserved point where it is
     blocks_.push_back(block);
   }
 
@@ -164,10 +164,10 @@ class TurnedSystem {
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
   std::vector<TrackBlock> blocks_;
-  std::vector<ByPhoto> by_photo_;  ///< An observation's ray by its photo's parameters.
+  std::vector<ByPhoto> by_photo_;  ///< Derivative of an observation's ray by the parameters of its photo.
 };
 
-/// Twice the negative log-likelihood, Huber's; a point without a pixel counts as `outside`.
+/// Twice the negative log-likelihood with Huber's cost; a point without a pixel counts as `outside`.
 double cost_of(const TurnedBundle& bundle, const TurnedPrior& prior, const TurnedSolveConfig& config) {
   constexpr double min_focal = 0.05;
   if (!(bundle.camera.head<2>().minCoeff() > min_focal)) return std::numeric_limits<double>::infinity();
@@ -215,7 +215,7 @@ TurnedSolution solve_turned(TurnedBundle& bundle, const TurnedPrior& prior, cons
       solution.cost = cost;
       bundle = std::move(next);
     }
-    if (!is_lower) solution.converged = true;  // the bottom, but for rounding
+    if (!is_lower) solution.converged = true;  // a minimum, up to rounding
   }
   solution.residuals.reserve(bundle.observations.size());
   for (const TurnedDetection& observation : bundle.observations) {

@@ -9,13 +9,13 @@
 namespace alidade {
 namespace {
 
-constexpr double first_sigma = 0.003;  // half widths: before it is estimated from the residuals
+constexpr double first_sigma = 0.003;  // half widths: until it is estimated from the residuals
 constexpr double min_sigma = 2e-5;     // about 0.01 px
-constexpr double max_sigma = 0.005;    // what is worse is no noise, but a wrong start that would take in everything
+constexpr double max_sigma = 0.005;    // above it: not noise, but a wrong initial guess that accepts everything
 constexpr double gate_sigmas = 4.5;
 constexpr double zoom_sigma = 0.3;
 
-/// σ of a coordinate by the median of the residuals' norms, which is √(2 ln 2) σ.
+/// σ of a coordinate from the median of the residual norms, which is √(2 ln 2) σ.
 double sigma_by_median(const TurnedFit& fit) {
   std::vector<double> norms = freed_norms(fit.bundle, fit.solution.residuals);
   std::erase_if(norms, [](double norm) { return !std::isfinite(norm); });
@@ -23,7 +23,7 @@ double sigma_by_median(const TurnedFit& fit) {
   return std::clamp(median_of(std::move(norms)) / rayleigh_median, min_sigma, max_sigma);
 }
 
-/// The same by squares, each residual beyond Huber's bound weighed down.
+/// The same from the mean square, with residuals beyond Huber's threshold downweighted.
 double sigma_by_weights(const TurnedFit& fit) {
   double sum = 0.0;
   for (const Eigen::Vector2d& residual : fit.solution.residuals) {
@@ -68,7 +68,7 @@ double freedom_of(const TurnedBundle& bundle) {
 
 TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedConfig& config) {
   constexpr double exact = 1e-7, unknown_focal = 5.0, free_centre = 0.5, free_aspect = 0.5;
-  constexpr double ordinary_centre = 0.03, ordinary_aspect = 1e-3;  // half widths; share
+  constexpr double ordinary_centre = 0.03, ordinary_aspect = 1e-3;  // half widths; relative
   constexpr double corner_k1 = 0.08, corner_k2 = 0.04, corner_k3 = 0.02, corner_k4 = 0.01, ordinary_p = 1e-3;
   TurnedPrior prior;
   const double fx = focal / (0.5 * (1.0 + config.aspect)), fy = config.aspect * fx;
@@ -79,14 +79,14 @@ TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedC
     prior.mean.segment<2>(2) = scale.normalised(k.tail<2>());
   }
   const double tall = static_cast<double>(photos.height_px) / photos.width_px;
-  const double corner = 1.0 / (fx * fx) + tall * tall / (fy * fy);  // r² there
+  const double corner = 1.0 / (fx * fx) + tall * tall / (fy * fy);  // r² at the corner of the image
   const double aspect = focal * (config.square_pixels ? exact : config.ordinary_aspect ? ordinary_aspect : free_aspect);
   const double centre = config.fixed_centre ? exact : config.ordinary_centre ? ordinary_centre : free_centre;
   const auto information = [](double sigma) { return 1.0 / (sigma * sigma); };
   TurnedInformation& Q = prior.information;
-  const Eigen::Vector2d off(std::sqrt(config.aspect), -1.0 / std::sqrt(config.aspect));  // 0 along that aspect
+  const Eigen::Vector2d off(std::sqrt(config.aspect), -1.0 / std::sqrt(config.aspect));  // perpendicular to that aspect
   Q.topLeftCorner<2, 2>() = information(aspect) * off * off.transpose();
-  Q.topLeftCorner<2, 2>().array() += 0.25 * information(unknown_focal * focal);  // of (fx + fy) / 2
+  Q.topLeftCorner<2, 2>().array() += 0.25 * information(unknown_focal * focal);  // prior of (fx + fy) / 2
   Q(2, 2) = Q(3, 3) = information(centre);
   Q(4, 4) = information(config.lens_terms > 0 ? corner_k1 / corner : exact);
   Q(5, 5) = information(config.lens_terms > 1 ? corner_k2 / (corner * corner) : exact);
@@ -121,11 +121,11 @@ class Rounds {
     if (frees_zoom_) fit_.prior.zoom_information = 1.0 / (zoom_sigma * zoom_sigma);
   }
 
-  /// All that the camera explains so far, adjusted, less what does not fit then. False: too little is left.
+  /// Adjusts all matches that the camera explains so far, then removes outliers. False: too few are left.
   bool again(const std::vector<int>& place, double gate) {
     const double given = std::max(sigma_by_median(fit_), given_);
     prepare(0.5 * (fit_.bundle.camera[0] + fit_.bundle.camera[1]));
-    // a match's transfer has the noise of both its ends
+    // the transfer of a match contains the noise of both ends
     const auto matches = explained_matches(photos_, fit_.bundle, place, gate * std::sqrt(2.0) * given);
     fit_.num_kept = set_tracks(photos_, matches, place, fit_.bundle);
     fit_.solve.sigma_px = given;
@@ -193,11 +193,11 @@ std::vector<TurnedFit> fits_from(const std::vector<FocalStart>& starts, const Ma
 std::vector<TurnedFit> fits_of_ordinary(const std::vector<TurnedFit>& fits, const MatchedPhotos& photos,
                                         const std::vector<PhotoLink>& links, const PhotoTree& tree,
                                         const TurnedConfig& config, const Progress& progress) {
-  constexpr double doubtful = 0.0025;  // half widths: 1.6 px of 1280, several times what a finder of points leaves
+  constexpr double doubtful = 0.0025;  // half widths: 1.6 px of 1280, several times the noise of a point detector
   const auto explains = [](const TurnedFit& fit) { return fit.solve.sigma_px < doubtful; };
   if (std::ranges::any_of(fits, explains)) return {};
   std::vector<FocalStart> starts;
-  for (const double focal : {0.9, 1.3, 1.9, 2.8})  // half widths: 96° to 39° across
+  for (const double focal : {0.9, 1.3, 1.9, 2.8})  // half widths: horizontal field of view from 96° to 39°
     starts.push_back(start_at(focal, photos, links, config.aspect));
   std::ranges::sort(starts, {}, &FocalStart::cost);
   std::vector<TurnedFit> found = fits_from(starts, photos, links, tree, config, progress);
@@ -259,7 +259,7 @@ ZoomTest free_zooms(TurnedFit fit, const Progress& progress) {
     const auto at = num_camera + per_photo * static_cast<Eigen::Index>(k) + 3;
     test.sigma.push_back(std::sqrt(std::max(cov(at, at), 0.0)));
   }
-  // the first photo's is fixed: all are stated relative to the central one
+  // the first photo's zoom is fixed: all are stated relative to the median one
   std::vector<double> sorted = test.log_zoom;
   const double middle = median_of(std::move(sorted));
   for (double& zoom : test.log_zoom) zoom -= middle;

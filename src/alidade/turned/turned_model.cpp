@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-constexpr double min_depth = 0.05;  // cosine of the angle to the axis: 87°
+constexpr double min_depth = 0.05;  // cosine of the angle to the optical axis: 87°
 
-/// d, its derivative by r², and that of r d by r; that one above zero: the lens does not fold.
+/// d, its derivative by r², and the derivative of r d by r, which is positive up to the fold of the lens.
 struct RadialFactor {
   double d = 1.0, by_r2 = 0.0, growth = 1.0;
 };
@@ -20,7 +20,7 @@ RadialFactor radial_factor(const TurnedCamera& camera, double r2) {
           1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * (7.0 * k3 + 9.0 * r2 * k4)))};
 }
 
-/// By p1 and p2: what they add to a point of the image plane at focal length 1.
+/// Derivative of a point in the normalised image plane by p1 and p2, in which it is linear.
 Eigen::Matrix2d decentring(const Eigen::Vector2d& x) {
   const double r2 = x.squaredNorm(), xy = 2.0 * x.x() * x.y();
   Eigen::Matrix2d by_p;
@@ -28,7 +28,7 @@ Eigen::Matrix2d decentring(const Eigen::Vector2d& x) {
   return by_p;
 }
 
-/// Where the lens puts x, and by x.
+/// The distorted point, and its derivative by x.
 struct Distorted {
   Eigen::Vector2d at;
   Eigen::Matrix2d by_x;
@@ -91,7 +91,7 @@ bool predict_turned(const TurnedCamera& camera, const Eigen::Matrix3d& R, double
 std::optional<Eigen::Vector3d> turned_ray(const TurnedCamera& camera, double log_zoom, const Eigen::Vector2d& px) {
   const double zoom = std::exp(log_zoom);
   const Eigen::Vector2d target((px.x() - camera[2]) / (zoom * camera[0]), (px.y() - camera[3]) / (zoom * camera[1]));
-  // Newton on r d(r), then in the plane for what p1 and p2 add.
+  // Newton's method on r d(r), then in the plane for the terms of p1 and p2.
   const double far = target.norm();
   double r = far;
   for (int i = 0; i < 30; ++i) {

@@ -12,9 +12,9 @@ namespace {
 
 using Status = TurnedReport::Status;
 
-constexpr double zoom_is_seen = 5.0, zoom_matters = 0.005;  // σ, share
+constexpr double zoom_is_seen = 5.0, zoom_matters = 0.005;  // σ; relative
 
-/// Some of the names: "a.jpg, b.jpg and 3 more".
+/// The first of the names: "a.jpg, b.jpg and 3 more".
 std::string list_of(const std::vector<std::string>& names) {
   constexpr std::size_t most = 4;
   std::string text;
@@ -60,7 +60,7 @@ Refusal zoomed(const TurnedReport& report, const MatchedPhotos& photos) {
           "exclude these, or take all at one zoom and focus; a step forward looks alike"};
 }
 
-/// What the photos do not determine, of what is not fixed.
+/// Which of the free parameters the photos do not determine.
 Refusal weak(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
   const Eigen::VectorXd sigma = report.cov.diagonal().cwiseSqrt();
   const double f = std::min(report.camera[0], report.camera[1]);
@@ -224,7 +224,7 @@ Check centre_check(const TurnedReport& report) {
   return check;
 }
 
-/// Nearly all cameras' pixels are square, and what is read row by row while the camera tilts seems not to be.
+/// Nearly all cameras have square pixels; a rolling shutter during a tilt imitates other ones.
 Check aspect_check(const TurnedReport& report, const TurnedConfig& config) {
   constexpr double most = 3.0, ordinary = 0.005;
   const double off = std::abs(report.free_aspect - 1.0);
@@ -258,7 +258,7 @@ Check lens_check(const TurnedReport& report) {
   return check;
 }
 
-/// Why there is no estimate, in a verdict; none where there is one.
+/// Why there is no estimate, as a verdict; none if there is an estimate.
 std::optional<Verdict> refusal_of(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
   switch (report.status) {
     case Status::too_few_photos:

@@ -33,8 +33,8 @@ double AxisController::pi_command(double error_rad) {
   return command;
 }
 
-/// The command that carries the axis, as it is known, along the target; kp and ki act on the difference between where
-/// that would have brought it and where it is. (On the difference to the target itself they would act twice, and
+/// Command that moves the axis, according to its model, along the target; kp and ki act on the difference between the
+/// model's angle and the measured one. (On the difference from the target itself they would act twice, and
 /// overshoot after a jump.)
 double AxisController::feedforward_on_angle(const AxisInput& input) {
   const auto& wanted = *input.wanted_rad;
@@ -45,7 +45,7 @@ double AxisController::feedforward_on_angle(const AxisInput& input) {
   return ahead + correction;
 }
 
-/// u = k (θ − θ_encoder) + dθ, in rates; dθ as it will be when the lag has passed: at half a period and τ.
+/// u = k (θ − θ_encoder) + dθ, as rates; dθ is taken after the lag: at half a period plus τ.
 double AxisController::feedforward_on_rate(const AxisInput& input) const {
   const auto& wanted = *input.wanted_rad;
   const ServoPlant& plant = expected_.axis().plant;
@@ -86,7 +86,7 @@ double AxisController::command(const AxisInput& input) {
     command = model_.is_rate_plant ? feedforward_on_rate(input) : feedforward_on_angle(input);
   }
   observer_.send(command);
-  return command == 0.0 ? 0.0 : command + std::copysign(dead_band_, command);  // what the band takes away
+  return command == 0.0 ? 0.0 : command + std::copysign(dead_band_, command);  // compensates the dead band
 }
 
 }  // namespace alidade

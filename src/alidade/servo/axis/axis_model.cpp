@@ -29,7 +29,7 @@ Eigen::RowVector2d lqr_gain(const AxisModel& model, double command_weight) {
   const double effect = effect_of_command(model), R = command_weight * effect * effect;
   Eigen::Matrix2d P = Q;
   Eigen::RowVector2d K = Eigen::RowVector2d::Zero();
-  for (int i = 0; i < 2000; ++i) {  // converges with the square of the closed loop's slowest pole: tens of steps
+  for (int i = 0; i < 2000; ++i) {  // converges with the square of the slowest closed-loop pole: tens of steps
     const double S = R + model.B.dot(P * model.B);
     const Eigen::RowVector2d next = (model.B.transpose() * P * model.A) / S;
     P = Q + model.A.transpose() * P * (model.A - model.B * next);

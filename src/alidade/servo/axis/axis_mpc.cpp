@@ -11,7 +11,7 @@ namespace alidade {
 namespace {
 
 constexpr int n = mpc_horizon;
-constexpr int max_sweeps = 40;  // 5 µs; what is left after them is a fraction of the command's noise
+constexpr int max_sweeps = 40;  // 5 µs; the remaining error is a fraction of the command's noise
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -34,7 +34,7 @@ AxisMpc::AxisMpc(const ServoAxis& axis, const AxisModel& model, double command_w
   const double gain = gain_of(axis.plant);
   rows_.setZero();
   rows_.topRows<n>().diagonal().setConstant(gain);  // g u
-  if (model.is_rate_plant) {                        // g u_i − ω_i: what the lag makes of it is the acceleration
+  if (model.is_rate_plant) {                        // g u_i − ω_i: acceleration times the lag
     rows_.middleRows<n>(n).diagonal().setConstant(gain);
     rows_.middleRows<n - 1>(n + 1) -= rate_per_command_.topRows<n - 1>();
   }
@@ -66,7 +66,7 @@ void AxisMpc::set_bounds(const Eigen::Vector2d& state, double disturbance, const
 }
 
 void AxisMpc::ascend(Horizon& commands) {
-  for (int i = 0; i < num_rows; ++i) {  // what pressed last time presses again, as a start
+  for (int i = 0; i < num_rows; ++i) {  // warm start: the constraints that were active last time
     if (!(curvature_[i] > 0.0) || (low_[i] == -unbounded && high_[i] == unbounded)) multipliers_[i] = 0.0;
   }
   commands.noalias() -= step_per_multiplier_ * multipliers_;
@@ -103,7 +103,7 @@ double AxisMpc::command(const Eigen::Vector2d& state, double disturbance,
   Horizon commands = inverse_hessian_ * pull;
   set_bounds(state, disturbance, free_angle, free_rate);
   ascend(commands);
-  // Where the programme has no solution (the axis beyond its stop) or was cut short: what the axis can do now.
+  // If the programme has no solution (axis beyond its stop) or was cut short, limits the command to what is possible.
   const double gain = gain_of(axis_.plant);
   double low = low_[0], high = high_[0];
   if (model_.is_rate_plant && std::max(low, low_[n]) <= std::min(high, high_[n])) {

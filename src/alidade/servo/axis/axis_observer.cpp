@@ -5,18 +5,18 @@
 namespace alidade {
 namespace {
 
-/// Stationary gain on the state (angle, rate, disturbance) for an encoder of this σ.
+/// Stationary Kalman gain of the state (angle, rate, disturbance) for an encoder with this σ.
 Eigen::Vector3d kalman_gain(const AxisModel& model, double gain, double sigma_encoder_rad) {
   Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
   F.topLeftCorner<2, 2>() = model.A;
   F.topRightCorner<2, 1>() = model.B;
-  // A fifth of the command's gain unknown, at the rates of a hand-held target, drifts by some mrad a sample.
+  // With a fifth of the command's gain unknown, the disturbance for a hand-held target drifts by some mrad per sample.
   const double drift = (model.is_rate_plant ? 0.02 : 0.002) / gain;
   const double R = std::max(sigma_encoder_rad * sigma_encoder_rad, 1e-10);
   const Eigen::Matrix3d Q = Eigen::Vector3d(1e-8, model.is_rate_plant ? 1e-5 : 0.0, drift * drift).asDiagonal();
   Eigen::Matrix3d P = Q;
   Eigen::Vector3d K = Eigen::Vector3d::Zero();
-  for (int i = 0; i < 1000; ++i) {  // settles in tens of steps
+  for (int i = 0; i < 1000; ++i) {  // converges within tens of steps
     P = F * P * F.transpose() + Q;
     K = P.col(0) / (P(0, 0) + R);
     P -= K * P.row(0).eval();

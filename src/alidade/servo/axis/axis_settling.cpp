@@ -18,7 +18,7 @@ ServoAxis without_ends(const ServoAxis& axis) {
   return smooth;
 }
 
-/// A controller, the axis that it drives, and the errors on their way to it.
+/// A controller, the axis that it drives, and the delayed errors between them.
 class SmallLoop {
  public:
   SmallLoop(const ServoConfig& config, const ServoAxis& known, const ServoAxis& real, double focal_px, double latency_s,
@@ -29,7 +29,7 @@ class SmallLoop {
         errors_(1 + static_cast<std::size_t>(std::max(0.0, std::ceil(latency_s / config.period_s - 1e-9))), 0.0) {
     input_.wanted_rad.emplace().setZero();
   }
-  /// One period; how far off the axis is then.
+  /// Simulates one period; returns the offset of the axis.
   double step() {
     std::rotate(errors_.begin(), errors_.end() - 1, errors_.end());
     errors_.front() = -axis_.motion().angle_rad;
@@ -45,17 +45,17 @@ class SmallLoop {
   AxisController controller_;
   DelayedAxis axis_;
   AxisInput input_;
-  std::vector<double> errors_;  ///< The newest first.
+  std::vector<double> errors_;  ///< Newest first.
 };
 
 }  // namespace
 
 double settling_per_period(const ServoConfig& config, const ServoAxis& known, const ServoAxis& real, double focal_px,
                            double latency_s) {
-  constexpr double offset_rad = 1e-6;  // far from every limit of rate, also when it has grown a thousandfold
+  constexpr double offset_rad = 1e-6;  // far from all rate limits, even after growing a thousandfold
   constexpr double settled = 1e-4, grown = 1e3;
   constexpr int shortest = 64, num_periods = 10240;
-  // What is on its way shows itself one delay later, and what that does another one.
+  // The effect of a command shows after one delay, and the reaction to it after another.
   const double late_s = latency_s + std::max(known.command_delay_s, real.command_delay_s);
   const int window = shortest + 2 * static_cast<int>(std::ceil(late_s / config.period_s));
   const int max_windows = std::max(16, num_periods / window);
@@ -71,7 +71,7 @@ double settling_per_period(const ServoConfig& config, const ServoAxis& known, co
     sizes.push_back(size);
     if (size < settled * offset_rad || size > grown * offset_rad) break;
   }
-  // Over the last half of the windows, so that what is over soon does not count.
+  // Over the last half of the windows, so that fast transients do not count.
   const double last = sizes.back();
   if (sizes.size() == 1) return std::pow(last / offset_rad, 1.0 / window);
   const std::size_t from = (sizes.size() - 1) / 2;

@@ -13,7 +13,7 @@ struct LinearStep {
   Eigen::Vector3d B = Eigen::Vector3d::Zero();
 };
 
-/// Column by column of what the axis does to a unit of each state.
+/// Computed column by column, as the response of the axis to a unit of each state.
 LinearStep lagged_step(const ServoAxis& axis, double dt_s) {
   const bool is_rate_plant = std::holds_alternative<RatePlant>(axis.plant);
   const auto after = [&](const Eigen::Vector3d& state, double command) -> Eigen::Vector3d {

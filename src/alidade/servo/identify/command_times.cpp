@@ -9,21 +9,21 @@
 #include "alidade/servo/identify/log_times.h"
 #include "alidade/servo/identify/sampled_log.h"
 
-// Commands that were given before the row in which the log has them.
+// Times of commands that were given before the row in which the log has them.
 
 namespace alidade {
 namespace {
 
 using Eigen::Index;
 
-/// By how much earlier a row's command may have been given: evenly distributed up to `most_s`.
+/// How much earlier than its row a command may have been given: uniformly distributed up to `most_s`.
 struct EarlierCommand {
   std::size_t row = 0;
   double most_s = 0.0, mean_s = 0.0, sigma_s = 0.0;
 };
 
-/// Of every command that changes, where commands are given between rows; where they are given at rows, of those whose
-/// row may be among lost ones.
+/// For every changed command, if commands are given between rows; if they are given at rows, for those whose
+/// row may have been lost.
 std::vector<EarlierCommand> earlier_commands(std::span<const ServoSample> log, bool between_rows) {
   constexpr double lost = 1.5;
   const double spacing_s = usual_spacing(log);
@@ -34,7 +34,7 @@ std::vector<EarlierCommand> earlier_commands(std::span<const ServoSample> log, b
     if (between_rows) {
       earlier.push_back({i, gap_s, 0.5 * gap_s, gap_s / std::sqrt(12.0)});
     } else if (gap_s > lost * spacing_s) {
-      const double num = std::round(gap_s / spacing_s);  // of rows that it may have stood in, this one included
+      const double num = std::round(gap_s / spacing_s);  // number of rows where it may have been given, with this one
       const double most_s = gap_s - spacing_s;
       earlier.push_back({i, most_s, 0.5 * most_s, spacing_s * std::sqrt((num * num - 1.0) / 12.0)});
     }
@@ -42,7 +42,7 @@ std::vector<EarlierCommand> earlier_commands(std::span<const ServoSample> log, b
   return earlier;
 }
 
-/// ∂ response / ∂ (how much earlier each): what a command pulls, a little sooner.
+/// ∂ response / ∂ (lead of each command): the effect of a command, a little sooner.
 Eigen::MatrixXd by_earlier(std::span<const ServoSample> log, const ServoFit& fit,
                            std::span<const EarlierCommand> earlier) {
   const std::vector<double> times_s = reading_times(log);
@@ -63,7 +63,7 @@ Eigen::MatrixXd by_earlier(std::span<const ServoSample> log, const ServoFit& fit
   return by;
 }
 
-/// Parameters and how much earlier each command was given, in one vector.
+/// The parameters and the lead of each command as one state.
 struct Joint {
   ServoFit fit;
   Eigen::VectorXd earlier_s;
@@ -98,11 +98,11 @@ class JointProblem {
     J << servo_response(joint.log, joint.fit.kind, joint.fit.params).J, by_earlier(joint.log, joint.fit, earlier_);
     return J;
   }
-  /// Per degree of freedom of the parameters alone: the commands' times have a distribution of their own.
+  /// Per degree of freedom of the parameters only: the times of commands have a prior.
   [[nodiscard]] double variance(const Joint& joint) const {
     return joint.sum2 / (static_cast<double>(readings_.size()) - num_servo_params);
   }
-  /// The normal matrix with what the log says of the times before: none is earlier than the row before it.
+  /// The normal matrix with the prior of the leads: no command is earlier than the row before its own.
   [[nodiscard]] Eigen::MatrixXd normal(const Eigen::MatrixXd& J, double variance) const {
     Eigen::MatrixXd normal = J.transpose() * J / variance;
     for (std::size_t j = 0; j < earlier_.size(); ++j) {
@@ -117,7 +117,7 @@ class JointProblem {
       sum += std::pow((joint.earlier_s[static_cast<Index>(j)] - earlier_[j].mean_s) / earlier_[j].sigma_s, 2);
     return sum;
   }
-  /// −A⁻¹ right, with times that it would move beyond their bounds held there.
+  /// −A⁻¹ right, with leads that would leave their bounds fixed at these.
   [[nodiscard]] Eigen::VectorXd bounded_step(const Eigen::MatrixXd& A, const Eigen::VectorXd& right,
                                              const Eigen::VectorXd& earlier_s) const {
     constexpr int rounds = 8;
@@ -146,7 +146,7 @@ class JointProblem {
     }
     return step;
   }
-  /// One step of Gauss–Newton, halved until the cost falls; the noise is what the residuals are, so far.
+  /// One Gauss–Newton step, halved until the cost decreases; the noise is estimated from the current residuals.
   [[nodiscard]] Joint stepped(const Joint& joint) const {
     const double noise2 = variance(joint), before = cost(joint, noise2);
     const Eigen::MatrixXd J = jacobian(joint), A = normal(J, noise2);
@@ -178,7 +178,7 @@ class JointProblem {
   Eigen::VectorXd readings_;
 };
 
-/// The parameters' covariance by what the times of commands leave open, beside that of times that are known.
+/// Covariance of the parameters due to uncertain command times, beyond that for known times.
 decltype(ServoFit::cov) of_times(const Eigen::MatrixXd& A) {
   const Eigen::VectorXd scale = A.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * A * scale.asDiagonal();
@@ -188,7 +188,7 @@ decltype(ServoFit::cov) of_times(const Eigen::MatrixXd& A) {
   return own * (all.topLeftCorner<num_servo_params, num_servo_params>() - known) * own;
 }
 
-/// Whether one linearisation says that it is worth trying: of times that are right each explains σ² on average.
+/// Whether one linearisation indicates the leads: if the logged times are correct, each explains σ² on average.
 bool is_indicated(const JointProblem& problem, const Joint& as_logged) {
   constexpr double sigmas = 5.0;
   const Eigen::MatrixXd J = problem.jacobian(as_logged);
@@ -200,9 +200,9 @@ bool is_indicated(const JointProblem& problem, const Joint& as_logged) {
   return explained.squaredNorm() > (num + sigmas * std::sqrt(2.0 * num)) * problem.variance(as_logged);
 }
 
-/// Times of one kind, estimated with the parameters; none where the log does not ask for them.
+/// Command times of one kind, estimated with the parameters; none if the log does not indicate them.
 std::optional<CommandTimes> estimated(std::span<const ServoSample> log, const ServoFit& fit, bool between_rows) {
-  constexpr std::size_t most = 60;  // of a chirp every row has another command
+  constexpr std::size_t most = 60;  // in a chirp every row has a new command
   constexpr int max_steps = 20;
   const std::vector<EarlierCommand> earlier = earlier_commands(log, between_rows);
   if (earlier.empty() || earlier.size() > most || 8 * earlier.size() > log.size()) return std::nullopt;
@@ -218,7 +218,7 @@ std::optional<CommandTimes> estimated(std::span<const ServoSample> log, const Se
   const double noise2 = problem.variance(joint);
   const Eigen::MatrixXd J = problem.jacobian(joint), own = J.leftCols(num_servo_params);
   const Eigen::MatrixXd A = problem.normal(J, noise2);
-  // Laplace: the times are integrated over, so that one that the log does not determine costs nothing.
+  // Laplace approximation: the leads are marginalised, so that one that the log does not determine costs nothing.
   double price = log_determinant(A) - log_determinant(own.transpose() * own / noise2);
   for (const EarlierCommand& each : earlier) price += 2.0 * std::log(each.sigma_s);
   CommandTimes times{joint.fit, {}, earlier.size(), of_times(A), 0.0};
@@ -245,7 +245,7 @@ std::optional<CommandTimes> command_times(std::span<const ServoSample> log, cons
   std::optional<CommandTimes> lost = estimated(log, fit, false), between = estimated(log, fit, true);
   std::optional<CommandTimes>& best = evidence_of(between) > evidence_of(lost) ? between : lost;
   if (!(evidence_of(best) > clear)) return std::nullopt;
-  // Not separated from commands between rows: these may be given up to a row before their own, at any distribution.
+  // Commands between rows remain possible: these may be up to a row earlier, with any distribution.
   if (evidence_of(lost) < evidence_of(between) + clear) best->sigma_offset_s = usual_spacing(log) / std::sqrt(12.0);
   return best;
 }

@@ -11,12 +11,12 @@
 namespace alidade {
 namespace {
 
-/// Fourier's first harmonic in what is left, by frequency.
+/// First Fourier harmonic of the delays at one frequency.
 struct Harmonic {
   double power = 0.0, cosine = 0.0, sine = 0.0;
 };
-/// It at frequencies in even steps. Phases are turned on from step to step, and computed anew so often that rounding
-/// stays at 10⁻¹⁴.
+/// The harmonic at equally spaced frequencies. Phases are rotated from step
+/// to step, and recomputed often enough to keep rounding errors at 10⁻¹⁴.
 class HarmonicSweep {
  public:
   HarmonicSweep(const std::vector<Eigen::Vector3d>& late, double step_hz) {  // (t, e, weight)
@@ -37,7 +37,7 @@ class HarmonicSweep {
     since_ = 0;
     return here();
   }
-  /// A step after the one before, which is at `hz`.
+  /// The harmonic one step after the previous one; `hz` is its frequency.
   [[nodiscard]] Harmonic next(double hz) {
     constexpr int most = 64;
     if (++since_ == most) return at(hz);
@@ -60,13 +60,13 @@ class HarmonicSweep {
     return {before / std::max(after, 1e-12) - 1.0, x[1], x[2]};
   }
 
-  Eigen::ArrayXd t_s_, weight_, weighted_;  ///< `weighted_`: e by its weight.
+  Eigen::ArrayXd t_s_, weight_, weighted_;  ///< `weighted_`: e times its weight.
   Eigen::ArrayXd turn_cos_, turn_sin_, cos_, sin_, turned_;
   double sum_ = 0.0, sum_e_ = 0.0, sum_ee_ = 0.0;
   int since_ = 0;
 };
 
-/// Squares that a sawtooth of this period and phase leaves of the times by which readings are late.
+/// Remaining sum of squares of the delays of readings after subtracting a sawtooth of this period and phase.
 double sawtooth_cost(const std::vector<Eigen::Vector3d>& late, double period, double phase) {
   double sum = 0.0, sum_e = 0.0, sum_ee = 0.0;
   for (const Eigen::Vector3d& each : late) {
@@ -79,7 +79,7 @@ double sawtooth_cost(const std::vector<Eigen::Vector3d>& late, double period, do
   return sum_ee - sum_e * sum_e / sum;
 }
 
-/// By how much readings are later than the model, where it moves: (t, e, weight).
+/// Delays of the readings relative to the model, while it moves: (t, e, weight).
 std::vector<Eigen::Vector3d> lateness(const AxisReadings& readings) {
   constexpr double least_rad_s = 1.0 * degree, longest_s = 0.4;
   const std::vector<double> angles = readings.model(readings.t_s);
@@ -96,7 +96,7 @@ std::vector<Eigen::Vector3d> lateness(const AxisReadings& readings) {
   return late;
 }
 
-/// A model between the times at which it was computed once.
+/// Interpolation of a model between times at which it is computed once.
 class SampledModel {
  public:
   SampledModel(const AxisReadings& readings, double margin_s)
@@ -146,7 +146,7 @@ std::optional<EncoderSampling> found_sampling(const AxisReadings& readings) {
   }
   if (best < min_gain) return std::nullopt;
   const Harmonic found = sweep.at(best_hz);
-  const double amplitude = std::hypot(found.cosine, found.sine) * std::numbers::pi * best_hz;  // 1 of a full sawtooth
+  const double amplitude = std::hypot(found.cosine, found.sine) * std::numbers::pi * best_hz;  // 1 for a full sawtooth
   if (amplitude < 0.5 || amplitude > 1.6) return std::nullopt;
   double cost = 1e300;
   EncoderSampling sampling;
@@ -170,7 +170,7 @@ EncoderSampling refined_sampling(const AxisReadings& readings, const EncoderSamp
   const double begin_s = readings.t_s.front(), end_s = readings.t_s.back();
   const double middle_s = given.last_s(0.5 * (begin_s + end_s));
   const double cycles = std::max(1.0, 0.5 * (end_s - begin_s) / given.period_s);
-  // The model's samples stay where they were fitted, but for the period; which of them a reading is changes.
+  // The samples of the model stay where they were fitted, except for the period; their assignment to readings changes.
   const auto cost_of = [&](double period, double shift) {
     double cost = 0.0;
     for (std::size_t i = 0; i < readings.t_s.size(); ++i) {

@@ -17,8 +17,8 @@ struct Candidate {
 
 constexpr int first_steps = 8, max_steps = 40;
 
-/// Begins the fit with one more flaw, from the two sizes that explain most; of a limit of rate also from one that
-/// hardly limits: a step beyond what is reached changes nothing, and does not come back.
+/// Fits one more flaw from the two best sizes; a rate limit also from one that hardly limits: a step to a limit
+/// above all rates has no effect on the residuals, and would not be undone.
 Candidate begun(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
   const bool is_linear = is_of_the_gain(flaw) || flaw == ServoFlaw::rate_offset;
   const std::size_t max_starts = is_linear ? 1 : 2;
@@ -36,9 +36,9 @@ Candidate begun(std::span<const ServoSample> log, const ServoFit& fit, const Fla
   return best;
 }
 
-/// Ends those fits that may be the best, or its rival: what is far behind after the first steps stays there.
+/// Completes the fits that may be the best or its rival: a fit far behind after the first steps remains so.
 void finish(std::span<const ServoSample> log, std::vector<Candidate>& candidates) {
-  constexpr double far = 60.0;  // in twice the log of the likelihood
+  constexpr double far = 60.0;  // in twice the log-likelihood
   std::ranges::sort(candidates, {}, &Candidate::sum2);
   double best2 = std::numeric_limits<double>::infinity(), rows = 0.0;
   for (Candidate& each : candidates) {
@@ -51,7 +51,7 @@ void finish(std::span<const ServoSample> log, std::vector<Candidate>& candidates
   std::ranges::sort(candidates, {}, &Candidate::sum2);
 }
 
-/// The largest rate that is read for as long as a drive takes to reach it.
+/// The largest rate that lasts as long as a drive takes to reach it.
 double lasting_rate(std::span<const ServoSample> log) {
   constexpr double min_s = 0.15;
   double most = 0.0;
@@ -63,8 +63,8 @@ double lasting_rate(std::span<const ServoSample> log) {
   return most;
 }
 
-/// The axis of a head that takes position commands: limits of rate and acceleration together, of which either alone
-/// explains little. From the best points of a grid, since there is more than one minimum.
+/// Head with position commands: limits of rate and acceleration together, either of which alone explains little.
+/// Starts from the best points of a grid, since there is more than one minimum.
 Candidate limited(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr std::size_t num_starts = 3;
   constexpr int first_limit_steps = 12;
@@ -97,8 +97,8 @@ bool is_limited(const ServoFit& fit) {
   return std::ranges::any_of(fit.freed, [](std::size_t flaw) { return flaw <= ServoFlaw::acceleration_limit; });
 }
 
-/// 2 ln of the likelihood ratio against squares `sum2`, counted in rows that do not share errors, and what of it is
-/// left over Schwarz's price of so many parameters and a margin for the choice.
+/// 2 ln of the likelihood ratio to the sum of squares `sum2`, counted in rows with independent errors;
+/// and the rest after Schwarz's penalty for the number of parameters and a margin for the choice.
 struct Evidence {
   double size = 0.0, left = -1.0;
 };
@@ -109,7 +109,7 @@ Evidence evidence_for(std::span<const ServoSample> log, double sum2, double num_
   return {size, size - num_params * std::log(rows) - margin};
 }
 
-/// The fit, with the evidence of what it has more than the one before.
+/// The fit, with the evidence for the flaws that it has beyond the fit before.
 ServoFit taken(const ServoFit& before, ServoFit fit, double evidence) {
   for (std::size_t i = before.freed.size(); i < fit.freed.size(); ++i) fit.flaw_evidence[fit.freed[i]] = evidence;
   return fit;

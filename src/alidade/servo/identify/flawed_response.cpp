@@ -14,9 +14,9 @@ using Eigen::Index;
 
 constexpr double no_limit = 1e9;
 
-/// What is left after a time t of s(0), where ds/dt = −s / (1 + |s|): ln |s| + |s| falls by t. Lambert's W, by steps of
-/// the fourth order: F. N. Fritsch, R. E. Shafer & W. P. Crowley, "Solution of the transcendental equation we^w = x",
-/// 1973.
+/// Solution after time t of ds/dt = −s / (1 + |s|) from s(0): ln |s| + |s| decreases
+/// by t. Lambert's W by a fourth-order iteration: F. N. Fritsch, R. E. Shafer & W.
+/// P. Crowley, "Solution of the transcendental equation we^w = x", 1973.
 double soft_decay(double s, double t) {
   constexpr int max_steps = 10;
   constexpr double tiny = 1e-300, near = 1e-4;
@@ -29,12 +29,12 @@ double soft_decay(double s, double t) {
     const double z = sum - std::log(left) - left, q = 2.0 * (1.0 + left) * (1.0 + left + 2.0 / 3.0 * z);
     const double by = z / (1.0 + left) * (q - z) / (q - 2.0 * z);
     left *= 1.0 + by;
-    if (std::abs(by) < near) break;  // what is left of it is the fourth power
+    if (std::abs(by) < near) break;  // the remaining error is its fourth power
   }
   return std::copysign(left, s);
 }
 
-/// A servo half-way through its log: an axis of gain and flaws as fitted, which counts its commands from zero.
+/// State of a simulated servo during the log: an axis with fitted gain and flaws, with commands relative to zero.
 class FlawedServo {
  public:
   FlawedServo(const ServoFit& fit, const ServoFlaws& flaws, double first_command, double max_command)
@@ -71,7 +71,7 @@ class FlawedServo {
   }
   [[nodiscard]] double read_rad() const { return read_; }
 
-  /// `share`: of the log's length, where this is.
+  /// `share`: current position in the log, from 0 to 1.
   void advance(double dt_s, double command, double share) {
     if (!(dt_s > 0.0)) return;
     if (command != command_ || flaws_.gain_drift != 0.0) {
@@ -107,7 +107,7 @@ class FlawedServo {
   }
 
  private:
-  /// The command that an axis of the stated gain would have to follow.
+  /// The command that gives the same motion with an axis of the stated gain.
   [[nodiscard]] double goal_of(double command, double share) const {
     if (flaws_.max_command > 0.0) command = std::clamp(command, -flaws_.max_command, flaws_.max_command);
     const double difference = command > 0.0 ? flaws_.gain_difference : -flaws_.gain_difference;
@@ -121,13 +121,13 @@ class FlawedServo {
     return goal;
   }
 
-  /// Of a rate that falls behind as it grows.
+  /// Whether the rate saturates gradually.
   [[nodiscard]] bool is_soft() const { return flaws_.soft_max_rate_rad_s > 0.0; }
   [[nodiscard]] double softened(double rate_rad_s) const {
     return is_soft() ? rate_rad_s / (1.0 + std::abs(rate_rad_s) / flaws_.soft_max_rate_rad_s) : rate_rad_s;
   }
 
-  /// As `advanced` without limits: the steps of a log have two lengths.
+  /// Like `advanced`, without limits and with cached decays: the steps of a log have two lengths.
   void move_unlimited(double dt_s, double command) {
     if (is_soft() && fit_.kind == ServoKind::angle) {
       const double reach = fit_.params[ServoParam::tau] * flaws_.soft_max_rate_rad_s;
@@ -146,7 +146,7 @@ class FlawedServo {
     }
   }
 
-  /// The play follows piece by piece where the drive may turn back within a step.
+  /// In short steps where the drive may reverse within one, so that the backlash follows.
   void move(double dt_s, double goal) {
     if (!is_soft() || !is_limited_ || fit_.kind == ServoKind::rate) {
       move_hard(dt_s, goal);
@@ -179,7 +179,7 @@ class FlawedServo {
       read();
     }
   }
-  /// What swings takes the drive's motion for a cubic: over a quarter of its time constant that is so to 10⁻⁵ of it.
+  /// The resonance approximates the drive's motion by a cubic: over a quarter of its time constant accurate to 10⁻⁵.
   void lag(double dt_s, double goal) {
     constexpr double per_tau = 4.0, max_steps = 40.0;
     const double tau_s = fit_.params[ServoParam::tau];
@@ -213,14 +213,14 @@ class FlawedServo {
   const ServoFit& fit_;
   const ServoFlaws& flaws_;
   bool is_limited_;
-  bool is_plain_;  ///< A step is one in closed form.
+  bool is_plain_;  ///< A step has a closed form.
   double max_command_;
   double gain_, tau_s_;
   Decay decays_;
   ServoAxis axis_;
   AxisMotion now_;
   std::optional<Resonance> swinging_;
-  double command_, goal_;  ///< That acts now, and what an axis of the stated gain would have to follow.
+  double command_, goal_;  ///< The active command, and its equivalent for an axis of the stated gain.
   double lagged_, read_ = 0.0, turned_ = 0.0;
 };
 

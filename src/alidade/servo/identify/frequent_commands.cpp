@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::array<std::size_t, 7> hypotheses{0, 1, 2, 3, 4, 6, continuous_commands};
 
-/// Of the polynomial through a row and its neighbours, two on each side where rows are regular; none where the command
-/// rests before or after it.
+/// Slope of the polynomial through a row and its neighbours, two on each side if rows are regular; zero if the command
+/// is constant before or after it.
 double slope_at(std::span<const ServoSample> log, std::size_t i) {
   constexpr double same = 0.01;
   if (i == 0 || i + 1 == log.size()) return 0.0;
@@ -33,17 +33,17 @@ double slope_at(std::span<const ServoSample> log, std::size_t i) {
   return (after_s * before + before_s * after) / (before_s + after_s);
 }
 
-/// Hermite's cubic from a row to the next.
+/// Cubic Hermite interpolation between a row and the next.
 double command_between(std::span<const ServoSample> log, std::size_t i, double share) {
   const double dt_s = log[i + 1].t_s - log[i].t_s, s = share, r = 1.0 - share;
   return r * r * (1.0 + 2.0 * s) * log[i].command + s * s * (1.0 + 2.0 * r) * log[i + 1].command +
          s * r * dt_s * (r * slope_at(log, i) - s * slope_at(log, i + 1));
 }
 
-/// By how much of a row commands act later in a log that has them at its rows than they do.
+/// Mean delay, in rows, of commands given between rows if a log is taken to have them at its rows.
 double late_rows(std::size_t per_row) { return per_row == 0 ? 0.0 : 0.5 * (1.0 - 1.0 / static_cast<double>(per_row)); }
 
-/// The fit of the log with so many commands, and Σ misfit².
+/// The fit of the log with `per_row` commands, and Σ misfit².
 struct Hypothesis {
   std::size_t per_row = 0;
   ServoFit fit;
@@ -104,14 +104,14 @@ std::vector<ServoSample> with_commands_between(std::span<const ServoSample> log,
   const double step_s = usual_spacing(log) / (is_continuous ? steps_of_all_the_time : static_cast<double>(per_row));
   for (std::size_t i = 0; i < log.size(); ++i) {
     const double gap_s = i + 1 < log.size() ? log[i + 1].t_s - log[i].t_s : 0.0;
-    const double num = std::clamp(std::round(gap_s / step_s), 1.0, 100.0);  // of a pause no more
+    const double num = std::clamp(std::round(gap_s / step_s), 1.0, 100.0);  // limited for a pause
     for (double k = 0.0; k < num; ++k) {
       ServoSample row = log[i];
       row.t_s += k / num * gap_s;
       if (k > 0.0) row.command = command_between(log, i, k / num);
       if (k > 0.0) row.sampled_t_s = log[i].read_s();
       if (is_continuous)
-        row.command_t_s = row.t_s - 0.5 * gap_s / num;  // half-way through the piece that it stands for
+        row.command_t_s = row.t_s - 0.5 * gap_s / num;  // the centre of the interval that it represents
       rows.push_back(row);
     }
   }

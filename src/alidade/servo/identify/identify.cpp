@@ -18,7 +18,7 @@
 namespace alidade {
 namespace {
 
-/// What blocks of rows say of the covariance, in scaled parameters so that their units do not matter.
+/// Cluster-robust covariance from blocks of rows, in scaled parameters so that units do not matter.
 void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, ServoIdentification& result) {
   ServoFit& fit = result.fit;
   result.correlated_rows = correlated_rows(result.residual_rad);
@@ -44,14 +44,14 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
   count_time_stamps(log, J, *inverse, result);
 }
 
-/// The index of the selected one of two fits, angle and rate.
+/// Index of the selected one of two fits, angle and rate.
 std::size_t believed_of(const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
-  // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
+  // An angle plant with a very long lag looks like a rate plant: a tenth less is not due to chance.
   if (rule == ServoKindRule::automatic) return fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0;
   return rule == ServoKindRule::rate ? 1 : 0;
 }
 
-/// Of readings as of rows, and the latency that their phase leaves open.
+/// Converts statistics of readings to rows, and adds the latency that the sampling phase leaves open.
 void count_by_row(std::span<const ServoSample> log, double sigma_phase_s, ServoIdentification& result) {
   const auto readings = static_cast<double>(result.residual_rad.size()), rows = static_cast<double>(log.size());
   result.correlated_rows =
@@ -65,7 +65,7 @@ ServoIdentification::Status status_of(const ServoFit& fit) {
   return fit.has_converged ? ServoIdentification::Status::converged : ServoIdentification::Status::not_converged;
 }
 
-/// Both kinds of plant, with what else the log shows of them.
+/// Fits for both kinds of plant, with everything else found in the log.
 struct Solution {
   std::vector<ServoSample> log;  ///< With the commands' times.
   std::array<ServoFit, 2> fits;
@@ -79,8 +79,8 @@ struct Solution {
   [[nodiscard]] bool is_plain() const { return fit().freed.empty() && slips.empty() && lost_commands.empty(); }
 };
 
-/// A gain that differs by the command's sign makes a rate plant drift, which may be all that a search without it sees:
-/// where structure is left, the fit with flaws from a search with it, if that leaves clearly less.
+/// A gain that differs by the sign of the command makes a rate plant drift, which may hide everything else in a search
+/// without it: if structure is left, searches with it, and keeps that fit with flaws if it leaves clearly less.
 void try_gain_by_sign(std::span<const ServoSample> log, std::span<const std::size_t> flaws, ServoFit& fit,
                       std::vector<ServoRival>& rivals) {
   constexpr double max_correlation = 0.3, clearly = 0.9;
@@ -105,7 +105,7 @@ void try_gain_by_sign(std::span<const ServoSample> log, std::span<const std::siz
 
 Solution with_flaws_tried(std::vector<ServoSample> log, const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
   Solution solution{std::move(log), fits, {}, 0, std::nullopt, {}, {}};
-  // Where one kind explains the log as it is, the other is not made to.
+  // If one kind explains the log as it is, no flaws are added to the other.
   const std::vector<std::size_t> tried = indicated_flaws(solution.log, fits[believed_of(fits, rule)]);
   for (std::size_t kind = 0; kind < 2 && !tried.empty(); ++kind) {
     solution.fits[kind] = with_flaws(solution.log, fits[kind], tried, solution.rivals[kind]);
@@ -116,7 +116,7 @@ Solution with_flaws_tried(std::vector<ServoSample> log, const std::array<ServoFi
   return solution;
 }
 
-/// 2 ln of the likelihood ratio of a fit with flaws against another, less Schwarz's price of them.
+/// 2 ln of the likelihood ratio of a fit with flaws to one without, minus Schwarz's penalty for them.
 double evidence_of_flaws(double rows, const ServoFit& plain, const ServoFit& flawed) {
   return 2.0 * rows * std::log(plain.rms_rad / flawed.rms_rad) -
          static_cast<double>(flawed.freed.size()) * std::log(rows);
@@ -133,7 +133,7 @@ double price_of_faults(std::span<const ServoSample> log, const Solution& solutio
   return 3.0 * one * static_cast<double>(solution.slips.size()) + (lost > 0 ? price_of_lost(log, lost) + one : 0.0);
 }
 
-/// A solution of the log as the axis had it, and 2 ln of its likelihood ratio less its price.
+/// A solution for a corrected log, and 2 ln of its likelihood ratio minus the penalty.
 struct Explained {
   Solution solution;
   double evidence = 0.0;
@@ -154,7 +154,7 @@ Explained explained(const Solution& before, std::vector<ServoSample> log, ServoK
   return found;
 }
 
-/// The slip that is left from this fit on, which follows it.
+/// The zero slip after alternating between refining the fit and estimating the slip.
 std::optional<ZeroSlip> settled_slip(std::span<const ServoSample> log, ServoFit fit) {
   constexpr int rounds = 4, max_steps = 10;
   std::optional<ZeroSlip> slip = zero_slip(log, fit);
@@ -165,7 +165,7 @@ std::optional<ZeroSlip> settled_slip(std::span<const ServoSample> log, ServoFit 
   return slip;
 }
 
-/// Lost commands or a slip of the encoder's zero, whichever explains more; no evidence where neither is found.
+/// Lost commands or a slip of the encoder's zero, whichever explains more; no evidence if neither is found.
 Explained with_a_fault(const Solution& before, ServoKindRule rule) {
   Explained best{before};
   const double rows = static_cast<double>(readings_of(before.log).size());
@@ -188,15 +188,15 @@ Explained with_a_fault(const Solution& before, ServoKindRule rule) {
     const std::optional<ZeroSlip> slip = settled_slip(before.log, start);
     if (!slip) continue;
     Explained trial = explained(before, without_faults(before.log, {}, {*slip}), rule, 3.0 * std::log(rows));
-    if (!zero_slip(before.log, trial.solution.fit())) continue;  // what is estimated since does it as well
+    if (!zero_slip(before.log, trial.solution.fit())) continue;  // the flaws estimated since explain it as well
     trial.solution.slips.push_back(*slip);
     keep_better(std::move(trial));
   }
   return best;
 }
 
-/// With what the log has that is none of the axis' doing, where that explains more than flaws of the axis do and leaves
-/// nothing: what an axis does beside the model may look like either.
+/// With faults of the log that are not due to the axis, if they explain more than flaws of the axis do and leave no
+/// structure: effects of the axis beyond the model may look like either.
 Solution with_faults_tried(const Solution& before, ServoKindRule rule) {
   constexpr double clear = 12.0;
   constexpr int most = 3;
@@ -209,8 +209,8 @@ Solution with_faults_tried(const Solution& before, ServoKindRule rule) {
   return is_white(now.log, now.fit()) ? now : before;
 }
 
-/// As logged; or with commands that were given before their rows, if they explain more than flaws of the axis, lost
-/// commands and slips do.
+/// As logged, or with commands given before their rows, if these explain more than flaws of the axis, lost commands
+/// and slips do.
 Solution without_resonance(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s,
                            const Solution& plain, ServoKindRule rule) {
   const auto& [log, fits] = std::tie(plain.log, plain.fits);
@@ -233,7 +233,7 @@ Solution without_resonance(std::span<const ServoSample> as_read, const std::vect
   return of_times > otherwise ? with_faults_tried(with_times, rule) : as_logged;
 }
 
-/// A resonance in a fit of this log, against what is believed.
+/// A fit of this log with a resonance, with the evidence against the selected solution.
 std::optional<Explained> resonant(const Solution& base, const ServoFit& start, const Solution& believed) {
   std::optional<ServoFit> fit = with_resonance(base.log, start);
   if (!fit) return std::nullopt;
@@ -246,7 +246,7 @@ std::optional<Explained> resonant(const Solution& base, const ServoFit& start, c
   return found;
 }
 
-/// Of both kinds that a log without anything else may be, and of what is believed where that leaves more.
+/// The best fit with a resonance: of both kinds for the log as it is, and of the selected solution if that has more.
 Explained most_resonant(const Solution& as_logged, const Solution& believed, ServoKindRule rule, bool is_asked) {
   constexpr double hopeless = 2.0, nothing = -std::numeric_limits<double>::infinity();
   Explained best{believed, nothing};
@@ -258,7 +258,7 @@ Explained most_resonant(const Solution& as_logged, const Solution& believed, Ser
   for (const ServoFit& start : as_logged.fits) {
     const bool is_other = start.kind != as_logged.fit().kind;
     if (start.params[ServoParam::tau] > duration_s)
-      continue;  // an angle plant that follows for ever is of the other kind
+      continue;  // an angle plant with a lag longer than the log is in fact a rate plant
     if (is_other && (rule != ServoKindRule::automatic || start.rms_rad > hopeless * as_logged.fit().rms_rad)) continue;
     if (!believed.times) offer(as_logged, start);
   }
@@ -267,8 +267,8 @@ Explained most_resonant(const Solution& as_logged, const Solution& believed, Ser
   return best;
 }
 
-/// With a resonance, where the log shows it and it explains clearly more. Tried when all else has been, since it looks
-/// like much else, and never where commands are of one size, which do not tell it from that.
+/// With a resonance, if the log indicates one and it explains clearly more. Tried after everything else, since many
+/// effects look like it, and never for commands of a single size, which do not distinguish these.
 Solution with_resonance_tried(const Solution& as_logged, const Solution& believed, ServoKindRule rule) {
   constexpr std::size_t several = 2;
   constexpr double margin = 12.0, clear = 10.0, beside_others = 40.0;
@@ -294,7 +294,7 @@ Solution with_resonance_tried(const Solution& as_logged, const Solution& believe
   return result;
 }
 
-/// From the rows that were read, and the same with the times at which an encoder was sampled.
+/// Solution from the rows as read, and with the times at which an encoder was sampled.
 Solution solved(std::span<const ServoSample> as_read, const std::vector<double>& sampled_t_s,
                 const std::vector<ServoSample>& log, ServoKindRule rule) {
   const std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle).params),
@@ -303,7 +303,7 @@ Solution solved(std::span<const ServoSample> as_read, const std::vector<double>&
   return with_resonance_tried(as_logged, without_resonance(as_read, sampled_t_s, as_logged, rule), rule);
 }
 
-/// As logged; or with commands between the rows, where they explain more than what the axis may do beside.
+/// As logged, or with commands between the rows, if these explain more than additional effects of the axis.
 Solution with_commands_between_tried(const std::vector<ServoSample>& log, Solution as_logged, ServoKindRule rule,
                                      std::size_t& per_row) {
   const ServoKind kind = as_logged.fit().kind;
@@ -316,7 +316,7 @@ Solution with_commands_between_tried(const std::vector<ServoSample>& log, Soluti
   return as_logged;
 }
 
-/// An axis that is another from some time on passes for a drift of clocks, or for limits. Then without these.
+/// A change of the axis at some time can look like clock drift or limits: then it is fitted without these.
 void find_change(Solution& found, ServoIdentification& result) {
   const ServoFit& fit = found.fit();
   const bool drifts = std::ranges::any_of(

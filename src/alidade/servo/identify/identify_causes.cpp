@@ -8,7 +8,7 @@
 namespace alidade {
 
 std::vector<ServoCause> servo_causes(std::span<const ServoSample> log, const ServoIdentification& identified) {
-  constexpr double sigmas_of_a_cause = 4.0;  // of some thirty trials the largest of a true model is below in 99.8 %
+  constexpr double sigmas_of_a_cause = 4.0;  // for a correct model, the largest of thirty is below it in 99.8 %
   const ServoFit& fit = identified.fit;
   std::vector<ServoCause> causes;
   if (!fit.is_observable || identified.residual_rad.empty()) return causes;
@@ -54,7 +54,7 @@ double encoder_step_rad(std::span<const ServoSample> log) {
   std::vector<double> angles;
   for (const ServoSample& row : log) angles.push_back(row.angle_rad);
   std::ranges::sort(angles);
-  constexpr double same_rad = 1e-8;  // as files round
+  constexpr double same_rad = 1e-8;  // rounding in files
   double step = 0.0;
   for (std::size_t i = 1; i < angles.size(); ++i) {
     const double apart = angles[i] - angles[i - 1];

@@ -13,12 +13,12 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double gain_unit = 0.05, max_gain_change = 0.9;  ///< Of a step of one, and at most.
+constexpr double gain_unit = 0.05, max_gain_change = 0.9;  ///< Size of a unit step, and the largest.
 constexpr double offset_unit_rad_s = 0.01;
-constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Of a step of one; beyond it nobody calls it a clock.
-constexpr double min_damping = 5e-3, max_damping = 0.98;   ///< Of what swings.
+constexpr double clock_unit = 0.01, max_clock_rate = 0.1;  ///< Size of a unit step; a larger rate is not a clock error.
+constexpr double min_damping = 5e-3, max_damping = 0.98;   ///< Range of the resonance's damping.
 
-/// What a step of one is in a flaw's size: those that have one sign go by factors.
+/// Size of a unit step of a flaw: flaws with a single sign change by factors.
 double unit_of(const ServoFit& fit, std::size_t flaw) {
   constexpr double turn_rad = 0.1;
   if (flaw == ServoFlaw::clock_rate) return clock_unit;
@@ -33,7 +33,7 @@ bool is_linear(std::size_t flaw) {
   return flaw == ServoFlaw::earlier_command || flaw == ServoFlaw::resonance_share || flaw == ServoFlaw::rate_offset;
 }
 
-/// What a step of one parameter or freed flaw makes of a fit.
+/// The fit after a step of one parameter or freed flaw.
 ServoFit moved(const ServoFit& fit, Index param, double by) {
   ServoFit next = fit;
   if (param < num_servo_params) {
@@ -55,21 +55,21 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
     else
       size *= std::exp(by);
     if (flaw == ServoFlaw::resonance_damping) size = std::clamp(size, min_damping, max_damping);
-    // Of two lags one is the shorter: the second.
+    // By convention the second of two lags is the shorter one.
     if (flaw == ServoFlaw::second_lag)
       size = std::clamp(size, 0.02 * next.params[ServoParam::tau], next.params[ServoParam::tau]);
   }
   return next;
 }
 
-/// Whether a step up leaves a flaw where its range ends.
+/// Whether a positive step leaves a flaw unchanged, at the upper end of its range.
 bool is_at_upper_end(const ServoFit& fit, Index param) {
   if (param < num_servo_params) return false;
   const double ServoFlaws::*size = servo_flaws[fit.freed[static_cast<std::size_t>(param - num_servo_params)]];
   return moved(fit, param, 1e-4).flaws.*size == fit.flaws.*size;
 }
 
-/// By how much a parameter is moved for a difference.
+/// Step of a parameter for numerical differentiation.
 double step_of(std::span<const ServoSample> log, const ServoFit& fit, Index param) {
   const double spacing_s = (log.back().t_s - log.front().t_s) / static_cast<double>(log.size());
   switch (param) {
@@ -87,7 +87,7 @@ double step_of(std::span<const ServoSample> log, const ServoFit& fit, Index para
   }
 }
 
-/// ∂ / ∂ (parameters, freed flaws in units of their own).
+/// ∂ response / ∂ (parameters, freed flaws in their own units), by central differences.
 Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const ServoFit& fit) {
   const auto num = static_cast<Index>(num_servo_params + fit.freed.size());
   Eigen::MatrixXd J(readings_of(log).size(), num);
@@ -105,7 +105,7 @@ Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const Serv
   return J;
 }
 
-/// The same by differences to one side of a fit whose misfit is known: half the work, for steps of a descent.
+/// The same by one-sided differences from a known misfit: half the cost, for the steps of a descent.
 Eigen::MatrixXd jacobian_of_steps(std::span<const ServoSample> log, const Eigen::VectorXd& readings,
                                   const ServoFit& fit, const Eigen::VectorXd& misfit) {
   const auto num = static_cast<Index>(num_servo_params + fit.freed.size());
@@ -149,7 +149,7 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
       return times(largest_command(log), {0.005, 0.01, 0.02, 0.05, 0.1, 0.2});
     case ServoFlaw::backlash:
       return times(response.maxCoeff() - response.minCoeff(), {0.002, 0.005, 0.01, 0.02, 0.05, 0.1});
-    case ServoFlaw::clock_rate:  // by the end a part of the time constant
+    case ServoFlaw::clock_rate:  // accumulates to a fraction of the time constant
       return times(fit.params[ServoParam::tau] / (log.back().t_s - log.front().t_s), {-0.2, -0.02, 0.02, 0.2});
     case ServoFlaw::earlier_command:
       return times(largest_command(log), {-1.0, 1.0});
@@ -214,9 +214,9 @@ std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const Servo
     ServoFlaws flaws = fit.flaws;
     flaws.*servo_flaws[flaw] = size;
     Eigen::VectorXd added = flawed_response(log, fit, flaws) - ground.response;
-    added -= ground.across * (ground.across.transpose() * added);  // the parameters follow
+    added -= ground.across * (ground.across.transpose() * added);  // projects out the parameters
     const double own2 = added.squaredNorm(), along = -added.dot(ground.misfit);
-    // Only in the flaw's own direction, and nothing where the parameters can do all that it does.
+    // Only for the sign of the flaw, and zero if the parameters can reproduce nearly all of its effect.
     const bool shows = own2 > 1e-3 * fit.rms_rad * fit.rms_rad && along > 0.0;
     scores.push_back({size, shows ? along * along / own2 : 0.0});
   }

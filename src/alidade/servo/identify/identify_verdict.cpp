@@ -33,7 +33,7 @@ std::string command_times_text(const ServoIdentification& identified) {
          text_of(1e3 * identified.sigma_command_s, 2) + " ms (σ) of the latency";
 }
 
-/// Commands that change from row to row: how many there are between two, and what that leaves open of the latency.
+/// Check of commands that change from row to row: how many there are per row, and the resulting uncertainty of latency.
 void add_frequent_commands(const ServoIdentification& identified, Verdict& verdict) {
   const std::size_t num = identified.commands_per_row;
   const double sigma_s = identified.sigma_command_s, most_s = max_sigma_command_s(identified.fit);
@@ -48,13 +48,13 @@ void add_frequent_commands(const ServoIdentification& identified, Verdict& verdi
   verdict.checks.push_back({"command times", is_small ? State::good : State::care, text, sigma_s, most_s, "s", ""});
 }
 
-/// Whether blocks of rows agree on what the servo does. What was before the log is seen in its first rows alone: one
-/// block, whose own scatter says nothing of others.
+/// Whether blocks of rows agree on the servo. Values from before the log affect only its first rows: a single
+/// block, whose own scatter says nothing about others.
 Check blocks_agree(const ServoIdentification& identified) {
   const ServoFit& fit = identified.fit;
   ClusterCovariance clusters = identified.clusters;
   std::vector<Eigen::Index> before{ServoParam::start};
-  if (fit.kind == ServoKind::rate) before.push_back(ServoParam::zero);  // to it adds what the rate at the start went on
+  if (fit.kind == ServoKind::rate) before.push_back(ServoParam::zero);  // includes motion due to the initial rate
   for (std::size_t i = 0; i < fit.freed.size(); ++i)
     if (fit.freed[i] == ServoFlaw::earlier_command) before.push_back(num_servo_params + static_cast<Eigen::Index>(i));
   for (const Eigen::Index place : before)
@@ -65,7 +65,7 @@ Check blocks_agree(const ServoIdentification& identified) {
   return clusters_agree(clusters, "block", shared, "response");
 }
 
-/// What the log has that is none of the axis' doing: the answer is without it.
+/// Checks of faults of the log that are not due to the axis; the answer is corrected for them.
 void add_faults(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   constexpr std::size_t listed = 5;
   if (const std::vector<std::size_t>& lost = identified.lost_commands; !lost.empty()) {
@@ -89,7 +89,7 @@ void add_faults(std::span<const ServoSample> log, const ServoIdentification& ide
          slip.size_rad, 3.0 * slip.sigma_rad, "rad", ""});
 }
 
-/// Before what it may be taken for.
+/// To be added before checks of effects that it may be mistaken for.
 void add_change(const ServoIdentification& identified, Verdict& verdict) {
   if (!identified.change) return;
   verdict.checks.push_back({"constancy", State::care,
@@ -101,7 +101,7 @@ void add_change(const ServoIdentification& identified, Verdict& verdict) {
 void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const double correlation = identified.lag_one_correlation, rows = static_cast<double>(reading_times(log).size());
-  // Of white residuals the correlation has σ = 1/√n; 0.3 is where structure costs more than noise.
+  // For white residuals the correlation has σ = 1/√n; at 0.3, structure costs more than noise.
   const double limit = std::max(0.3, 4.0 / std::sqrt(rows));
   const bool is_white = std::abs(correlation) < limit;
   verdict.checks.push_back(
@@ -151,7 +151,7 @@ std::string flaw_text(const ServoFit& fit, std::size_t flaw) {
          text_of(3.0 * fit.flaw_sigma[flaw], 2) + " " + servo_flaw_units[flaw] + ")";
 }
 
-/// What the servo does beside a lag: what was estimated, and what the residuals still indicate.
+/// Effects beyond a lag: those that were estimated, and those that the residuals still indicate.
 void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const std::vector<ServoCause> causes = identified.change ? std::vector<ServoCause>() : servo_causes(log, identified);
@@ -182,7 +182,7 @@ void add_causes(std::span<const ServoSample> log, const ServoIdentification& ide
   verdict.checks.push_back(check);
 }
 
-/// What a log of one size of command could not show, by name and by what it would do.
+/// Names and effects of flaws that a log with a single command size cannot show.
 std::string hidden_text(const std::vector<HiddenFlaw>& hidden) {
   std::string text = "steps of one size: they do not separate another gain from ";
   for (std::size_t i = 0; i < hidden.size(); ++i) {
@@ -209,10 +209,10 @@ void add_excitation(std::span<const ServoSample> log, const ServoIdentification&
                             static_cast<double>(least), "sizes", ""});
 }
 
-/// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
+/// Checks for degrees read as radians, milliseconds as seconds, and an encoder coarser than its noise.
 void add_readings(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   constexpr double max_turn_rad = 6.2831853071795865;
-  constexpr double max_rate_rad_s = 20.0;  // more than a thousand degrees a second: no head rotates so fast
+  constexpr double max_rate_rad_s = 20.0;  // more than a thousand degrees per second: no head rotates so fast
   const double range = identified.angle_range_rad;
   if (range > max_turn_rad && identified.fit.kind == ServoKind::angle)
     verdict.checks.push_back(
@@ -240,7 +240,7 @@ void add_readings(std::span<const ServoSample> log, const ServoIdentification& i
          "rows are " + text_of(spacing_s) + " s apart: are these " + unit->name + "? t_s is in seconds", spacing_s, 1.0,
          "s", ""});
   const double step_rad = encoder_step_rad(log);
-  // Rounding errs by step/√12; beyond two of the noise's σ it is no longer spread by the noise.
+  // Rounding has σ = step/√12; a step above two σ of the noise is not dithered by it.
   if (step_rad > 2.0 * identified.fit.rms_rad)
     verdict.checks.push_back({"rounding", State::care,
                               "the encoder reads in steps of " + text_of(step_rad / degree, 2) +
@@ -248,12 +248,12 @@ void add_readings(std::span<const ServoSample> log, const ServoIdentification& i
                               step_rad, 2.0 * identified.fit.rms_rad, "rad", ""});
 }
 
-/// Times of which a part is in another unit: rows hundreds of times further apart at one end than at the other.
+/// Times that are partly in another unit: intervals hundreds of times larger at one end of the log than at the other.
 std::optional<Verdict> mixed_units(std::span<const ServoSample> log) {
   constexpr double least_ratio = 200.0;
   const std::size_t some = log.size() / 8;
   if (some < 2) return std::nullopt;
-  const auto spacing_s = [&](std::size_t first) {  // the median: a pause is no other unit
+  const auto spacing_s = [&](std::size_t first) {  // median: a pause does not change it
     std::vector<double> apart_s;
     for (std::size_t i = first; i < first + some; ++i) apart_s.push_back(log[i + 1].t_s - log[i].t_s);
     return median_of(apart_s);
@@ -265,7 +265,7 @@ std::optional<Verdict> mixed_units(std::span<const ServoSample> log) {
                  "write all of t_s in seconds");
 }
 
-/// What the log does not determine; nothing where it determines gain, time constant and latency.
+/// What the log does not determine; none if it determines gain, time constant and latency.
 std::optional<Verdict> refusal(std::span<const ServoSample> log, const ServoIdentification& identified) {
   const std::string excite = "log a step or a chirp of the command that moves the axis by degrees";
   if (log.size() < 20)
@@ -284,7 +284,7 @@ std::optional<Verdict> refusal(std::span<const ServoSample> log, const ServoIden
     return refused("no answer: the gain " + text_of(fit.params[0]) + " is not distinguishable from zero (σ " +
                        text_of(sigma[0]) + ")",
                    excite);
-  // Of two lags their sum may be determined, and how it is split not; an axis that lags otherwise may have none.
+  // Of two lags only the sum may be determined, not its split; an axis with another lag may have no time constant.
   const bool is_split = std::ranges::count(fit.freed, std::size_t{ServoFlaw::second_lag}) > 0;
   const double open = is_split ? 2.0 : 0.5, of_log = is_lagged_otherwise(fit) ? 0.1 : 0.02;
   if (!(sigma[1] < open * fit.params[1]) && !(fit.params[1] + 2.0 * sigma[1] < of_log * identified.duration_s))

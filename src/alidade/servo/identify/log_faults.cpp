@@ -8,14 +8,14 @@
 #include "alidade/servo/identify/identify_flaws.h"
 #include "alidade/servo/identify/sampled_log.h"
 
-// Commands that the axis never followed, and slips of the encoder's zero.
+// Commands that the axis did not follow, and slips of the encoder's zero.
 
 namespace alidade {
 namespace {
 
 using Eigen::Index;
 
-/// A row whose command differs from the one before it.
+/// A row whose command differs from the one before.
 struct CommandChange {
   std::size_t row = 0;
   double given_s = 0.0, by = 0.0;
@@ -29,7 +29,7 @@ std::vector<CommandChange> changes_of(std::span<const ServoSample> log) {
   return changes;
 }
 
-/// The response to steps of the commands, which is linear in what each of them does.
+/// The response to the steps of the commands, linear in the effect of each.
 class StepResponses {
  public:
   StepResponses(std::span<const ServoSample> log, ServoKind kind, std::vector<CommandChange> changes)
@@ -43,7 +43,7 @@ class StepResponses {
     for (Index i = 0; i < readings_.size(); ++i) readings_[i] = readings[i * static_cast<Index>(stride)];
   }
 
-  /// Zero, start, and a step of one at each change.
+  /// Columns: zero, start, and a unit step at each change.
   [[nodiscard]] Eigen::MatrixXd at(double tau_s, double latency_s) const {
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(readings_.size(), 2 + static_cast<Index>(changes_.size()));
     const bool is_rate = kind_ == ServoKind::rate;
@@ -59,7 +59,7 @@ class StepResponses {
         if (t_s > changes_[j].given_s + latency_s)
           A(i, 2 + static_cast<Index>(j)) = answer(t_s - changes_[j].given_s - latency_s);
     }
-    // A rate plant goes on at its first command's rate, whatever that is.
+    // A rate plant continues at the rate of its first command, which is unknown.
     if (is_rate) {
       A.conservativeResize(Eigen::NoChange, A.cols() + 1);
       for (Index i = 0; i < A.rows(); ++i)
@@ -67,19 +67,19 @@ class StepResponses {
     }
     return A;
   }
-  /// Σ misfit² with whatever each command does.
+  /// Σ misfit² with a free effect of each command.
   [[nodiscard]] double sum2(const Eigen::MatrixXd& A) const {
-    constexpr double ridge = 1e-10;  // what acts after the log does nothing
+    constexpr double ridge = 1e-10;  // for commands without effect within the log
     const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
     const Eigen::MatrixXd scaled = A * scale.asDiagonal();
     Eigen::MatrixXd normal = scaled.transpose() * scaled;
     normal.diagonal().array() += ridge;
     return (scaled * solve_symmetric(normal, scaled.transpose() * readings_) - readings_).squaredNorm();
   }
-  /// Σ misfit² with the same gain for all of them, but that some were lost.
+  /// Σ misfit² with a common gain and some commands lost.
   [[nodiscard]] double sum2_without(const Eigen::MatrixXd& A, const std::vector<char>& is_lost) const {
     Eigen::VectorXd jumps = Eigen::VectorXd::Zero(static_cast<Index>(changes_.size()));
-    double waits = 0.0;  // what lost commands would have changed, the next that arrives does
+    double waits = 0.0;  // the change of lost commands takes effect with the next one that arrives
     for (std::size_t j = 0; j < changes_.size(); ++j) {
       waits += changes_[j].by;
       if (is_lost[j]) continue;
@@ -104,7 +104,7 @@ class StepResponses {
   Eigen::VectorXd readings_;
 };
 
-/// Where each command may do what it does, time constant and latency follow from its shape alone.
+/// With a free effect of each command, time constant and latency are determined by the shape of the responses alone.
 struct FreeFit {
   Eigen::MatrixXd A;
   double sum2 = std::numeric_limits<double>::infinity(), latency_s = 0.0;
@@ -125,8 +125,8 @@ FreeFit free_fit(const StepResponses& steps, double row_s) {
   return best;
 }
 
-/// From none on, the one that is lost, or is not, by which the squares fall most, as long as they do by more than a
-/// choice among so many would.
+/// Greedy selection: starting with none lost, toggles the command that reduces the sum of squares most, as long as the
+/// reduction exceeds that of the best of so many choices by chance.
 std::vector<char> lost_of(const StepResponses& steps, const FreeFit& fit) {
   const auto num = steps.changes().size();
   std::vector<char> is_lost(num, 0);
@@ -157,7 +157,7 @@ std::vector<char> lost_of(const StepResponses& steps, const FreeFit& fit) {
 }  // namespace
 
 std::vector<std::size_t> lost_commands(std::span<const ServoSample> log, ServoKind kind) {
-  constexpr std::size_t least = 4, most = 60;  // of a chirp every row has another command
+  constexpr std::size_t least = 4, most = 60;  // in a chirp every row has a new command
   const StepResponses steps(log, kind, changes_of(log));
   const std::size_t num = steps.changes().size();
   if (num < least || num > most || 8 * num > reading_times(log).size()) return {};
@@ -167,7 +167,7 @@ std::vector<std::size_t> lost_commands(std::span<const ServoSample> log, ServoKi
   std::vector<std::size_t> rows;
   for (std::size_t j = 0; j < num; ++j)
     if (is_lost[j]) rows.push_back(steps.changes()[j].row);
-  return 3 * rows.size() <= num ? rows : std::vector<std::size_t>();  // most were followed
+  return 3 * rows.size() <= num ? rows : std::vector<std::size_t>();  // most must have been followed
 }
 
 double price_of_lost(std::span<const ServoSample> log, std::size_t lost) {
@@ -186,7 +186,7 @@ std::optional<ZeroSlip> zero_slip(std::span<const ServoSample> log, const ServoF
   for (Index k = n - 1; k > 0; --k) {
     after += ground.across.row(k);
     sum += ground.misfit[k];
-    const double own2 = static_cast<double>(n - k) - after.squaredNorm();  // the parameters follow
+    const double own2 = static_cast<double>(n - k) - after.squaredNorm();  // projects out the parameters
     if (!(own2 > least_rows)) continue;
     const double along = -(sum - after.dot(left));
     if (!(along * along / own2 > best2)) continue;

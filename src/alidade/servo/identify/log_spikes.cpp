@@ -5,13 +5,13 @@
 #include "alidade/servo/identify/identify_causes.h"
 #include "alidade/servo/identify/sampled_log.h"
 
-// Angles that were never there: a bit that was lost on a line, a row of another axis.
+// Spurious angles: a bit lost in transmission, a row of another axis.
 
 namespace alidade {
 namespace {
 
-/// What neighbours within eight rows differ by at most, but for a spike (of two differences) more, outside rows
-/// [first, last].
+/// The third largest difference of neighbouring rows within eight rows around [first, last], so that another spike (of
+/// two differences) does not count.
 double usual_change(std::span<const ServoSample> log, std::size_t first, std::size_t last) {
   constexpr std::size_t near = 8, of_another = 2;
   std::vector<double> changes;
@@ -34,7 +34,7 @@ std::vector<std::size_t> spikes(std::span<const ServoSample> log) {
   constexpr double far = 10.0, least_steps = 5.0, least_rad = 1e-6;
   const double step_rad = encoder_step_rad(log);
   std::vector<std::size_t> rows;
-  // How far rows [i, i + num) are from the row before and the row after them, to the same side.
+  // Distance of rows [i, i + num) from the row before and the row after them, if on the same side; otherwise 0.
   const auto off_by = [&](std::size_t i, std::size_t num) {
     const double in = i > 0 ? log[i].angle_rad - log[i - 1].angle_rad : log[i].angle_rad - log[i + num].angle_rad;
     const double out = log[i + num - 1].angle_rad - log[i + num].angle_rad;
@@ -46,7 +46,7 @@ std::vector<std::size_t> spikes(std::span<const ServoSample> log) {
     for (std::size_t num = 1; num <= longest && found == 0 && i + num < log.size(); ++num) {
       const double by_rad = off_by(i, num), usual_rad = usual_change(log, i, i + num - 1);
       if (!(by_rad > std::max({least_rad, least_steps * step_rad, far * usual_rad}))) continue;
-      // Of the first rows only those after them say which are the spike.
+      // For the first rows only the rows after them show which ones are the spike.
       const bool is_followed = i > 0 || i + num + 1 >= log.size() ||
                                std::abs(log[i + num + 1].angle_rad - log[i + num].angle_rad) < 0.5 * by_rad;
       if (is_followed) found = num;
@@ -62,7 +62,7 @@ std::vector<ServoSample> without_rows(std::span<const ServoSample> log, const st
   for (std::size_t i = 0; i < log.size(); ++i) {
     if (std::ranges::binary_search(rows, i)) continue;
     ServoSample row = log[i];
-    // Its command was given in the first of the rows before it that are left out and have it.
+    // Its command was given in the first of the removed rows before it that have the same command.
     std::size_t first = i;
     while (first > 0 && std::ranges::binary_search(rows, first - 1) && log[first - 1].command == row.command) --first;
     const bool is_given_there = first < i && first > 0 && log[first - 1].command != row.command;

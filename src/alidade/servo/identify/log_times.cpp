@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Index;
 
-/// The variance of the rows' times, from a regression of r² on the squared rate, and its score.
+/// Variance of the rows' time errors, from a regression of r² on the squared rate, and its score.
 struct TimeVariance {
   double value = 0.0, score = 0.0;
 };
@@ -22,7 +22,7 @@ TimeVariance time_variance(const ServoIdentification& result, const Eigen::Vecto
   const Eigen::ArrayXd rate2 = rate.array().square() - rate.array().square().mean();
   const double spread = rate2.square().sum();
   if (!(spread > 0.0) || !(square.square().sum() > 0.0)) return {};
-  // Squares of neighbouring residuals are correlated by the square of what these are.
+  // The correlation of squared residuals is the square of that of the residuals.
   const double correlation = std::min(
       0.95, std::pow((residual.head(n - 1) * residual.tail(n - 1)).sum(), 2) / std::pow(residual.square().sum(), 2));
   const double slope = (square * rate2).sum() / spread;
@@ -30,7 +30,7 @@ TimeVariance time_variance(const ServoIdentification& result, const Eigen::Vecto
   return {slope, slope / sigma};
 }
 
-/// ∂ rate / ∂ t.
+/// ∂ rate / ∂ t, by central differences.
 Eigen::VectorXd slope_of(std::span<const ServoSample> log, const Eigen::VectorXd& rate) {
   const std::vector<double> times_s = reading_times(log);
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(rate.size());
@@ -45,7 +45,7 @@ Eigen::VectorXd slope_of(std::span<const ServoSample> log, const Eigen::VectorXd
 
 std::optional<RegularTimes> regular_times(std::span<const ServoSample> log) {
   constexpr double as_written_s = 2e-6, most_off = 1.05,
-                   least_of_spacing = 0.02;  // off: of a step, in all
+                   least_of_spacing = 0.02;  // off: total, in steps
   constexpr std::size_t least_rows = 20;
   if (log.size() < least_rows) return std::nullopt;
   const double begin_s = log.front().t_s, spacing_s = usual_spacing(log);

@@ -8,7 +8,7 @@
 #include "alidade/servo/identify/identify_flaws.h"
 #include "alidade/servo/identify/log_times.h"
 
-// A time constant that a log leaves open in part, though it determines the answer.
+// A time constant that the log determines only in part, though it determines the answer.
 
 namespace alidade {
 
@@ -39,7 +39,7 @@ void count_short_lag(std::span<const ServoSample> log, ServoFit& fit) {
 
 Eigen::MatrixXd with_open_lag(std::span<const ServoSample> log, const ServoFit& fit, Eigen::MatrixXd J) {
   using Eigen::Index;
-  constexpr double shows = 2.0, short_rows = 0.5;  // in σ of a reading; of the time between rows
+  constexpr double shows = 2.0, short_rows = 0.5;  // in σ of a reading; in row intervals
   constexpr std::array<double, 7> widths{0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 0.98};
   const double tau_s = fit.params[ServoParam::tau], spacing_s = usual_spacing(log);
   const auto lag = std::ranges::find(fit.freed, std::size_t{ServoFlaw::second_lag});

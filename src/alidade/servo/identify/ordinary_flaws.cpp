@@ -11,10 +11,10 @@ namespace {
 
 constexpr double ordinary_dead_band = 0.002;  // of the largest command: friction, rounded commands
 constexpr double ordinary_backlash_rad = 0.03 * degree;
-constexpr double ordinary_eccentricity_rad = 1e-3;  // 20 µm of an encoder's ring of 40 mm
+constexpr double ordinary_eccentricity_rad = 1e-3;  // 20 µm for an encoder ring of 40 mm
 constexpr double ordinary_damping = 0.2, ordinary_share = 0.5;
 
-/// A flaw that is taken to be none, and σ of what there may be of it.
+/// A flaw that is assumed absent, and σ of its typical size.
 struct Ordinary {
   double ServoFlaws::*flaw;
   double sigma;
@@ -24,7 +24,7 @@ bool is_freed(const ServoFit& fit, double ServoFlaws::*flaw) {
   return std::ranges::any_of(fit.freed, [&](std::size_t each) { return servo_flaws[each] == flaw; });
 }
 
-/// What the parameters do about effects that are not in the model.
+/// Response of the estimated parameters to effects that are not in the model (considered parameters).
 class Considered {
  public:
   Considered(const ServoIdentification& identified, const FlawGround& ground, const Eigen::MatrixXd& J,
@@ -35,11 +35,11 @@ class Considered {
         variance_(std::pow(identified.fit.rms_rad, 2) * std::max(1.0, identified.clusters.design_effect)) {}
   [[nodiscard]] bool knows() const { return variance_ > 0.0; }
 
-  /// By how much they move, beside what the log says of it, for what one σ of an effect adds to the response. Of one
-  /// that has a single sign nothing is left where the residuals ask for the other.
+  /// Change of the parameters for an effect with σ `added` on the response, given the log. For
+  /// an effect with a single sign the mean is zero if the residuals indicate the opposite sign.
   [[nodiscard]] Eigen::VectorXd follow(const Eigen::VectorXd& added, bool has_one_sign) const {
     const Eigen::VectorXd own = added - ground_.across * (ground_.across.transpose() * added);
-    // In units of its σ: what is left of it after the log, about zero.
+    // In units of its σ: root mean square after the log.
     const double left2 = 1.0 / (1.0 + own.squaredNorm() / variance_);
     const double mean = -left2 * own.dot(ground_.misfit) / variance_;
     const double share = std::sqrt(left2 + std::pow(has_one_sign ? std::max(mean, 0.0) : mean, 2));
@@ -60,7 +60,7 @@ void count(const Eigen::VectorXd& follow, ServoFit& fit) {
   }
 }
 
-/// An encoder whose ring is not centred reads a sine of the angle too much, wherever that begins: a sine and a cosine.
+/// An eccentric encoder ring adds a sine of the angle with unknown phase to the reading: a sine and a cosine.
 void count_eccentricity(const FlawGround& ground, const Considered& considered, ServoIdentification& result) {
   const std::array<Eigen::VectorXd, 2> waves{ground.response.array().cos(), ground.response.array().sin()};
   for (const Eigen::VectorXd& wave : waves) {
@@ -71,7 +71,7 @@ void count_eccentricity(const FlawGround& ground, const Considered& considered, 
   }
 }
 
-/// A resonance that the log does not excite, of the frequency at which it moves the latency most: below, it shows.
+/// A resonance that the log does not excite, at the frequency with the largest effect on the latency: lower ones show.
 void count_resonance(std::span<const ServoSample> log, const FlawGround& ground, const Considered& considered,
                      ServoIdentification& result) {
   if (is_freed(result.fit, &ServoFlaws::resonance_hz)) return;

@@ -15,7 +15,7 @@ ServoParams unit_params(double tau_s, double latency_s) {
   return params;
 }
 
-/// The response to commands of one sign: by it a gain that differs by the sign changes the response.
+/// Response to commands of one sign: the change of the response for a gain that differs by sign.
 Eigen::VectorXd rectified_response(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s) {
   std::vector<ServoSample> rows(log.begin(), log.end());
   for (ServoSample& row : rows) row.command = std::abs(row.command);
@@ -31,7 +31,7 @@ LinearFit fit_of(const Eigen::MatrixXd& A, const Eigen::VectorXd& readings, doub
   return fit;
 }
 
-/// By which the response to gain, zero and start is linear.
+/// Columns of gain, zero and start, in which the response is linear.
 Eigen::MatrixXd linear_part(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s) {
   const ServoResponse response = servo_response(log, kind, unit_params(tau_s, latency_s));
   Eigen::MatrixXd A(response.J.rows(), 3);
@@ -79,7 +79,7 @@ LinearFit searched(std::span<const ServoSample> log, ServoKind kind, bool by_sig
       keep_better(turning, fit_of(with_column(std::move(A), at_s), readings, tau_s, latency_s));
     }
   }
-  // What a rate plant turns by beside its command may hide all else that it does.
+  // For a rate plant, a drift besides its command may hide all other effects.
   if (turning.sum2 < clearly * best.sum2) return turning;
   return best;
 }

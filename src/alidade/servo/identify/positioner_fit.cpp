@@ -18,7 +18,7 @@ const std::vector<int> sampled_places{P::rate,     P::acceleration, P::time_cons
                                       P::backlash, P::offset,       P::sampling};
 constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3;
 
-/// The largest rate that lasted for 0.15 s or more.
+/// The largest rate that lasted for at least 0.15 s.
 double fastest(const std::vector<PositionerReading>& readings) {
   constexpr double min_s = 0.15;
   double largest = 0.0;
@@ -31,7 +31,7 @@ double fastest(const std::vector<PositionerReading>& readings) {
   return largest;
 }
 
-/// From each command to the first change that is read: their median.
+/// Median time from a command to the first change that is read [s].
 double first_latency(const PositionerLog& log) {
   std::vector<double> waits;
   for (std::size_t i = 0; i < log.commands.size(); ++i) {
@@ -48,8 +48,8 @@ double first_latency(const PositionerLog& log) {
   return waits.empty() ? 0.05 : median_of(std::move(waits));
 }
 
-/// From the best points of a coarse grid: the cost has more than one local minimum. All readings count in full: where
-/// far ones count as their logarithm, a whole move can be given up for less than an encoder's sampling costs in all.
+/// From the best points of a coarse grid, as the cost has several local minima. All readings have full weight: with the
+/// logarithmic loss, giving up a whole move can cost less than the sampling of an encoder does in total.
 PositionerVector best_start(const PositionerProblem& problem, double rate, double latency) {
   constexpr std::size_t num_starts = 4;
   constexpr int few_steps = 20;
@@ -74,7 +74,7 @@ PositionerVector best_start(const PositionerProblem& problem, double rate, doubl
     best = theta;
   };
   for (std::size_t i = 0; i < num_starts; ++i) try_from(grid[i].second);
-  for (const double side : {-1.0, 1.0}) {  // out of a valley along which they trade
+  for (const double side : {-1.0, 1.0}) {  // to leave a valley along which both compensate
     PositionerVector moved = best;
     moved[P::acceleration] += 0.2 * side;
     moved[P::latency] = std::max(0.0, moved[P::latency] + 0.006 * side);
@@ -83,7 +83,7 @@ PositionerVector best_start(const PositionerProblem& problem, double rate, doubl
   return best;
 }
 
-/// Covariance: by the model, or by what moves scatter where that is more.
+/// σ from the model's covariance, or from the scatter between moves if that is larger.
 PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVector& theta,
                            const std::vector<int>& free, double noise2) {
   const Eigen::MatrixXd J = problem.jacobian(theta, free);
@@ -109,7 +109,7 @@ PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVec
   return (noise2 * inverse.diagonal()).cwiseMax(robust.diagonal()).cwiseMax(0.0).cwiseSqrt();
 }
 
-/// The loss where one parameter is fixed at zero, the others refitted: 2 ln of the likelihood ratio.
+/// Increase of the cost if one parameter is fixed at zero and the others refitted: 2 ln of the likelihood ratio.
 double evidence_of(const PositionerProblem& problem, PositionerVector theta, const std::vector<int>& free, int place,
                    double nothing, double noise2) {
   constexpr int few_steps = 20;
@@ -148,7 +148,7 @@ void fill_repeatability(const PositionerLog& log, double step, PositionerFit& fi
                        s / std::max(step, 1e-9)};
 }
 
-/// Where it rests by what it was commanded: a line.
+/// Linear fit of the position at rest to the command.
 void fill_gain(const PositionerLog& log, PositionerFit& fit) {
   constexpr double rested_s = 0.5;
   std::vector<Eigen::Vector2d> pairs;
@@ -160,7 +160,7 @@ void fill_gain(const PositionerLog& log, PositionerFit& fit) {
       before = last;
       last = &reading;
     }
-    // A reading that is cached stands, too, where the axis moves.
+    // A cached reading can also repeat while the axis moves.
     if (last != nullptr && before != nullptr && last->angle_rad == before->angle_rad &&
         last->t_s - log.commands[i].t_s > rested_s)
       pairs.emplace_back(log.commands[i].target_rad, last->angle_rad);
@@ -180,7 +180,7 @@ void fill_gain(const PositionerLog& log, PositionerFit& fit) {
   fit.sigma_gain = std::sqrt(s2 * normal.inverse()(1, 1));
 }
 
-/// A fit to the encoder's samples.
+/// A fit to the samples of the encoder.
 struct SampledFit {
   PositionerProblem problem;
   PositionerVector theta;
@@ -188,7 +188,7 @@ struct SampledFit {
   double cost = 0.0;
 };
 
-/// From a sampling and the latency that it leaves: the values fitted to the samples, and the sampling to the values.
+/// Starting from a sampling and its latency, alternates between fitting the parameters and refining the sampling.
 SampledFit fitted_to_samples(const PositionerProblem& as_asked, EncoderSampling sampling, PositionerVector theta) {
   constexpr int rounds = 4;
   SampledFit fit{as_asked, theta, sampling};
@@ -198,7 +198,7 @@ SampledFit fitted_to_samples(const PositionerProblem& as_asked, EncoderSampling 
     fit.problem.set_sampling(fit.sampling, fit.theta);
     fit.cost = fit.problem.solve(fit.theta, sampled_places);
     fit.sampling = fit.problem.fitted(fit.sampling, fit.theta);
-    if (round == 0) {  // the residuals of the times of requests determine it better now
+    if (round == 0) {  // the residuals at the times of requests determine it better now
       if (const auto again = as_asked.find_sampling(fit.theta)) fit.sampling = *again;
     } else if (round + 1 < rounds) {
       fit.sampling = fit.problem.refined(fit.sampling, fit.theta);
@@ -207,10 +207,10 @@ SampledFit fitted_to_samples(const PositionerProblem& as_asked, EncoderSampling 
   return fit;
 }
 
-/// What was fitted to the times of requests can be so far off that readings are taken for other samples, and stay so:
-/// the cost has other minima, which leave readings unexplained. Starts anew from there.
+/// The fit to the times of requests can be so far off that readings are assigned to wrong samples, and stay
+/// so: the cost has other minima, which leave readings unexplained. Starts again from the parameters found.
 void leave_wrong_samples(const PositionerProblem& as_asked, double rate, SampledFit& best) {
-  constexpr double unexplained = 2.0, latency_share = 0.4;  // of the start that best_start() begins with
+  constexpr double unexplained = 2.0, latency_share = 0.4;  // share of the latency with which best_start() begins
   const auto explains = [&] { return best.cost < unexplained * static_cast<double>(as_asked.size()); };
   if (explains()) return;
   PositionerVector start = best_start(best.problem, rate, best.theta[P::latency] / latency_share);
@@ -237,7 +237,7 @@ void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& 
   cost = best.cost;
 }
 
-/// Long moves that are over at the first reading after the command.
+/// Whether long moves are complete at the first reading after the command.
 bool reads_its_target(const PositionerLog& log) {
   constexpr double long_rad = 2.0 * degree, soon_s = 0.08;  // no drive starts and stops so soon
   int moves = 0, jumps = 0;
@@ -287,13 +287,13 @@ double reading_step(const std::vector<PositionerReading>& readings) {
     if (apart > same_rad && (step == 0.0 || apart < step)) step = apart;
   }
   if (!(step > 0.0)) return 0.0;
-  const double whole = std::round((angles.back() - angles.front()) / step);  // a longer lever determines it better
+  const double whole = std::round((angles.back() - angles.front()) / step);  // a longer range determines it better
   return whole > 0.0 && whole < 1e5 ? (angles.back() - angles.front()) / whole : step;
 }
 
 namespace {
 
-/// The optimum with its σ, and what counts as evidence there.
+/// The optimum with its σ, and the threshold of evidence.
 struct Optimum {
   PositionerVector theta, sigma;
   std::vector<int> free;
@@ -310,7 +310,7 @@ Optimum solve(const PositionerLog& log, PositionerProblem& problem, PositionerFi
   fit.noise = std::sqrt(mean);
   found.noise2 = std::max(1.0, mean);
   found.sigma = sigmas_of(problem, found.theta, found.free, found.noise2);
-  found.least_evidence = std::log(static_cast<double>(problem.size())) + 6.0;  // BIC, and what is not modelled
+  found.least_evidence = std::log(static_cast<double>(problem.size())) + 6.0;  // BIC, and a margin for model errors
   return found;
 }
 
@@ -322,7 +322,7 @@ void fill_rate(const PositionerParams& params, const PositionerVector& sigma, Po
   fit.rate.sigma = std::max(fit.rate.sigma, 0.3 * fit.rate.value);
 }
 
-/// Values that a log need not show: acceleration, time constant, backlash.
+/// Parameters that a log may not show: acceleration, time constant, backlash.
 void fill_tested(PositionerProblem& problem, const Optimum& found, double step, PositionerFit& fit) {
   const PositionerParams params = positioner_params(found.theta, fit.dead_band.value);
   const auto value = [&](int place, double nothing, double at, double sigma) {
@@ -333,15 +333,15 @@ void fill_tested(PositionerProblem& problem, const Optimum& found, double step, 
                            found.sigma[P::acceleration] * params.acceleration_rad_s2);
   fit.time_constant = value(P::time_constant, std::log(instant_s), params.time_constant_s,
                             found.sigma[P::time_constant] * params.time_constant_s);
-  // Neighbouring readings round alike: what they say together is not below a quarter of a step.
+  // Neighbouring readings have the same rounding: their joint accuracy is limited to a quarter of a step.
   fit.backlash = value(P::backlash, 0.0, params.backlash_rad, std::hypot(found.sigma[P::backlash], 0.25 * step));
 }
 
 void fill_latency(const PositionerLog& log, const PositionerProblem& problem, const Optimum& found,
                   PositionerFit& fit) {
-  constexpr double phase_share = 0.02;  // when in its period the encoder is sampled is known no better
+  constexpr double phase_share = 0.02;  // accuracy of the sampling phase, as a share of the period
   const double period = fit.encoder_hz > 0.0 ? 1.0 / fit.encoder_hz : 0.0;
-  // Who sent and who received do not agree better on when than the answer took.
+  // The times of command and reading have a common offset up to the duration of the replies.
   std::vector<double> waits;
   for (const PositionerReading& reading : problem.readings()) waits.push_back(reading.wait_s);
   const double shared_s = std::hypot(median_wait(log.command_waits_s), median_wait(waits)) / std::sqrt(12.0);

@@ -10,9 +10,9 @@
 namespace alidade {
 namespace {
 
-constexpr double clock_sigma_s = 2e-4;  // between a program and the device's own clock
+constexpr double clock_sigma_s = 2e-4;  // between a program and the clock of the device
 
-/// At rest the same rounding error is read repeatedly: the first readings contain everything.
+/// Removes repeated readings at rest: they have the same rounding error, and the first ones contain everything.
 std::vector<PositionerReading> without_rests(const std::vector<PositionerReading>& all) {
   constexpr int kept_at_rest = 2;
   std::vector<PositionerReading> some;
@@ -25,7 +25,7 @@ std::vector<PositionerReading> without_rests(const std::vector<PositionerReading
   return some;
 }
 
-/// How many readings in a row are the same: they share one rounding error.
+/// Number of equal consecutive readings for each reading: they share one rounding error.
 std::vector<double> shared_roundings(const std::vector<PositionerReading>& readings) {
   std::vector<double> shared(readings.size(), 1.0);
   for (std::size_t i = 0, j = 0; i < readings.size(); i = j) {
@@ -82,7 +82,7 @@ std::vector<double> PositionerProblem::response(const PositionerVector& theta, c
   return angles;
 }
 
-/// Of another period, about the middle of the log: what is common is the latency's.
+/// Sampling times for another period, about the middle of the log, so that a common shift belongs to the latency.
 std::vector<double> PositionerProblem::sampled_times(double sampling) const {
   std::vector<double> times = times_;
   for (double& time : times) time += sampling * (time - middle_s());
@@ -165,7 +165,7 @@ void PositionerProblem::set_sampling(const EncoderSampling& sampling, const Posi
   std::vector<double> edges_s;
   for (const PositionerReading& reading : readings_) edges_s.push_back(0.5 * reading.wait_s);
   times_ = sample_times(axis_readings(theta), sampling, edges_s);
-  // When it was asked no longer counts, only when it was sampled.
+  // The time of the request does not matter any more, only that of the sample.
   for (std::size_t i = 0; i < size(); ++i)
     sigma_[i] = std::max(1e-7, std::hypot(step_rad_ * std::sqrt(shared_[i] / 12.0), rate_[i] * 0.25 * clock_sigma_s));
 }

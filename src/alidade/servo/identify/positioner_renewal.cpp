@@ -10,7 +10,7 @@ namespace {
 
 constexpr double not_yet = -1e300;
 
-/// While it moves by many steps from reading to reading: how long each stands. 0: hardly longer than it is asked.
+/// Median time for which a reading stays constant while the axis moves by many steps. 0: hardly longer than the request
 double renewal_s(const PositionerLog& log, double step_rad) {
   constexpr double long_s = 0.15, times = 3.0, many_steps = 5.0;
   constexpr std::size_t fewest = 3;
@@ -37,7 +37,7 @@ void heed_renewal(const PositionerLog& log, double step_rad, PositionerFit& fit)
   fit.renewal_s = renewal_s(log, step_rad);
   if (fit.renewal_s == 0.0) return;
   std::vector<double> waits;
-  double sum_span2 = 0.0;  // of what moves took, each known but for its ends
+  double sum_span2 = 0.0;  // of the durations of moves, whose ends are uncertain
   for (std::size_t k = 0; k < log.commands.size(); ++k) {
     const double from_s = log.commands[k].t_s;
     const double until_s = k + 1 < log.commands.size() ? log.commands[k + 1].t_s : 1e300;

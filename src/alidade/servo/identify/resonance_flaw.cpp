@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Index;
 
-/// What readings resolve: from two cycles in the log to two and a half readings in a cycle.
+/// Frequencies that the readings resolve: from two cycles per log to two and a half readings per cycle.
 std::vector<double> frequencies(std::span<const ServoSample> log, double ratio) {
   constexpr double lowest_hz = 0.5, highest_hz = 50.0, per_log = 2.0, per_reading = 0.4;
   const std::vector<double> times_s = reading_times(log);
@@ -28,7 +28,7 @@ std::vector<double> frequencies(std::span<const ServoSample> log, double ratio) 
   return all;
 }
 
-/// What a share of one adds to a response: what swings behind it, which goes in straight lines from reading to reading.
+/// Contribution of a resonance with a share of one to a response, which is taken as linear between readings.
 Eigen::VectorXd added_by(const std::vector<double>& times_s, const Eigen::VectorXd& response, double hz,
                          double damping) {
   Eigen::VectorXd added = Eigen::VectorXd::Zero(response.size());
@@ -44,7 +44,7 @@ Eigen::VectorXd added_by(const std::vector<double>& times_s, const Eigen::Vector
   return added;
 }
 
-/// The same across what the parameters can follow; nothing where these do nearly all of it.
+/// The same with the parameters projected out; none if these can reproduce nearly all of it.
 std::optional<Eigen::VectorXd> added_across(const std::vector<double>& times_s, const FlawGround& ground, double rms,
                                             double hz, double damping) {
   constexpr double least = 1e-3;
@@ -58,9 +58,9 @@ double at_lag(const Eigen::VectorXd& values, Index lag) {
   return values.head(values.size() - lag).dot(values.tail(values.size() - lag));
 }
 
-/// Of Σ own · error, if errors are as correlated as `left` is, and no less than white ones are, nor than those are that
-/// grow where the axis moves, as of times that err (H. White, "A heteroskedasticity-consistent covariance matrix
-/// estimator", 1980).
+/// Variance of Σ own · error for errors correlated like `left`; at least that for white
+/// errors, and that for errors which grow with the motion of the axis, like errors of
+/// times (H. White, "A heteroskedasticity-consistent covariance matrix estimator", 1980).
 double score_variance(const Eigen::VectorXd& own, const Eigen::VectorXd& left, double dof) {
   constexpr std::size_t least_lags = 4, parts = 8;
   const std::vector<double> errors(left.data(), left.data() + left.size());
@@ -75,8 +75,8 @@ double score_variance(const Eigen::VectorXd& own, const Eigen::VectorXd& left, d
   return std::max({sum, white, own.cwiseProduct(left).squaredNorm()});
 }
 
-/// The log where commands at rows that were lost are taken to be between those beside them: each after a gap is then as
-/// if it was given in the middle of what is lost.
+/// The log with commands at lost rows assumed between their neighbours: each one after a gap is then treated as
+/// if it was given in the middle of the gap.
 std::vector<ServoSample> with_lost_rows(std::span<const ServoSample> log) {
   constexpr double least = 1.5;
   std::vector<double> apart_s;
@@ -89,7 +89,7 @@ std::vector<ServoSample> with_lost_rows(std::span<const ServoSample> log) {
   return rows;
 }
 
-/// The ground where the parameters follow in one more direction, to which the response was moved.
+/// Extends the ground by one more direction that the parameters can follow: the change to `response`.
 void let_follow(const Eigen::VectorXd& response, FlawGround& ground) {
   constexpr double least = 1e-6;
   Eigen::VectorXd added = response - ground.response;
@@ -105,8 +105,8 @@ struct ResonantFit {
   double sum2 = 0.0;
 };
 
-/// The fit with a resonance, of a share that one linearisation says, at the best frequencies of a grid for each of two
-/// damping ratios, and what that leaves. The best first, those beside a better one left out.
+/// Fits with a resonance at the best frequencies of a grid for each of several damping ratios, with the share from
+/// one linearisation, and their residuals. Best first, without neighbours of better ones.
 std::vector<ResonantFit> starts_at(std::span<const ServoSample> log, const ServoFit& base) {
   constexpr double ratio = 1.15, most_share = 2.0, apart = 1.5;
   constexpr std::size_t most = 2;
@@ -137,9 +137,9 @@ std::vector<ResonantFit> starts_at(std::span<const ServoSample> log, const Servo
   return starts;
 }
 
-/// Of what swings: a lightly damped one, within what readings resolve; or an axis of the second order, all of it.
+/// Whether a resonance is plausible: lightly damped within the resolved range, or a second-order axis (share of 1).
 bool has_meaning(std::span<const ServoSample> log, const ServoFlaws& flaws) {
-  constexpr double most_damping = 0.6, beyond = 1.2;  // from 0.7 on nothing is resonant
+  constexpr double most_damping = 0.6, beyond = 1.2;  // above 0.7 there is no resonance
   constexpr double off_whole = 0.1, most_of_an_axis = 0.97;
   const bool is_whole = std::abs(flaws.resonance_share - 1.0) < off_whole && flaws.resonance_damping < most_of_an_axis;
   const std::vector<double> known = frequencies(log, beyond);
@@ -147,8 +147,8 @@ bool has_meaning(std::span<const ServoSample> log, const ServoFlaws& flaws) {
          flaws.resonance_hz > known.front() / beyond && flaws.resonance_hz < known.back() * beyond * beyond;
 }
 
-/// Leaves out those on their way to where a better one is, and those whose 2 ln of the likelihood is `far` below the
-/// best.
+/// Removes trials that have converged to the same solution as a better one, and those whose 2 ln of the likelihood is
+/// `far` below the best.
 void leave_out_followers(double rows, double far, std::vector<ResonantFit>& trials) {
   constexpr double same = 0.01;
   std::vector<ResonantFit> kept;
@@ -162,9 +162,9 @@ void leave_out_followers(double rows, double far, std::vector<ResonantFit>& tria
   trials = std::move(kept);
 }
 
-/// −2 ln of a fit's evidence: the likelihood, integrated over its parameters (Laplace), so that a minimum that a chance
-/// of the noise makes in a narrow place does not stand before a wide one. Of frequency and damping a factor of e is
-/// nothing unusual. `rows`: that do not share errors.
+/// −2 ln of a fit's evidence: the likelihood marginalised over its parameters (Laplace), so
+/// that a narrow minimum due to noise does not win over a wide one. The prior of frequency
+/// and damping has a σ of a factor of e. `rows`: number of rows with independent errors.
 double improbability(std::span<const ServoSample> log, const ResonantFit& trial, double rows) {
   const ServoFit& fit = trial.fit;
   Eigen::MatrixXd J = flawed_jacobian(log, fit);
@@ -180,7 +180,7 @@ double improbability(std::span<const ServoSample> log, const ResonantFit& trial,
   return rows * std::log(trial.sum2) + log_determinant(A);
 }
 
-/// What else the residuals indicate and the fit does not have, each of the size that explains most.
+/// Other flaws that the residuals indicate and the fit does not have, each with the size that explains most.
 std::vector<ServoFlaws> other_causes(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground) {
   constexpr double min_sigmas = 3.5;
   std::vector<ServoFlaws> others;
@@ -209,7 +209,7 @@ AddedResonances added_resonances(std::span<const ServoSample> log, const Eigen::
 ResonanceScore resonance_score(std::span<const ServoSample> log, const ServoFit& fit, FlawGround ground,
                                std::span<const ServoFlaws> others) {
   constexpr double ratio = 1.06;
-  let_follow(flawed_response(with_lost_rows(log), fit, fit.flaws), ground);  // of a chirp it looks like a resonance
+  let_follow(flawed_response(with_lost_rows(log), fit, fit.flaws), ground);  // for a chirp it looks like a resonance
   for (const ServoFlaws& other : others) let_follow(flawed_response(log, fit, other), ground);
   ground.misfit -= ground.across * (ground.across.transpose() * ground.misfit);
   const double num = static_cast<double>(ground.across.cols()) + 1.0;
@@ -224,7 +224,7 @@ ResonanceScore resonance_score(std::span<const ServoSample> log, const ServoFit&
       if (!own) continue;
       const double own2 = own->squaredNorm(), along = -own->dot(ground.misfit), share = along / own2;
       const double white2 = std::max(sum2 - share * along, 1e-12 * sum2) / dof * own2;
-      if (along * along <= best.sigmas * best.sigmas * white2) continue;  // correlated errors count for less
+      if (along * along <= best.sigmas * best.sigmas * white2) continue;  // correlated errors reduce the score
       const double sigmas = std::abs(along) / std::sqrt(score_variance(*own, ground.misfit + share * *own, dof));
       if (sigmas > best.sigmas) best = {hz, damping, share, sigmas};
     }
@@ -246,7 +246,7 @@ std::optional<ServoFit> with_resonance(std::span<const ServoSample> log, const S
       base.params[ServoParam::latency] *= late;
       std::ranges::copy(starts_at(log, base), std::back_inserter(trials));
     }
-  // All of them a little, the better ones further, those that may be the best to their ends.
+  // A few steps for all, more for the better ones, and full convergence for those that may be the best.
   struct Round {
     std::size_t most;
     int max_steps;

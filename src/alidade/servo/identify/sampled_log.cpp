@@ -10,13 +10,13 @@
 namespace alidade {
 namespace {
 
-/// A sample was taken between two rows.
+/// A change of the angle: a sample was taken between two rows.
 struct Change {
-  double t_s = 0.0, half_s = 0.0;  ///< The middle between the rows, and half of the time between them.
+  double t_s = 0.0, half_s = 0.0;  ///< Midpoint between the rows, and half of their interval.
 };
 
-/// Rows that differ from the one before by more than rounding can: of an encoder that is read faster than it is
-/// sampled, most of the rows before them repeat theirs.
+/// Rows that differ from the one before by more than rounding. For an encoder that is read faster than it is
+/// sampled, most of the rows before them are repetitions; otherwise there are none.
 std::vector<Change> held_changes(std::span<const ServoSample> log) {
   constexpr double least_steps = 2.5, least_share = 0.4;
   const double least_rad = least_steps * encoder_step_rad(log);
@@ -32,7 +32,7 @@ std::vector<Change> held_changes(std::span<const ServoSample> log) {
   return changes;
 }
 
-/// Σ exp(2πi t/P), over their number.
+/// Mean of exp(2πi t/P) over the changes.
 std::complex<double> coherence(std::span<const Change> changes, double hz) {
   std::complex<double> sum = 0.0;
   for (const Change& change : changes)
@@ -40,7 +40,7 @@ std::complex<double> coherence(std::span<const Change> changes, double hz) {
   return sum / static_cast<double>(changes.size());
 }
 
-/// The frequency within `reach_hz` of one at which changes are most in step.
+/// The frequency within `reach_hz` of `hz` at which the changes are most coherent.
 double most_coherent(std::span<const Change> changes, double hz, double reach_hz) {
   constexpr double per_cycle = 0.1;
   const double step_hz = per_cycle / (changes.back().t_s - changes.front().t_s);
@@ -52,7 +52,7 @@ double most_coherent(std::span<const Change> changes, double hz, double reach_hz
   return best_hz;
 }
 
-/// From consecutive changes: longer times are rests between them.
+/// Initial period from consecutive changes: longer intervals contain pauses.
 double first_period(std::span<const Change> changes) {
   constexpr double longest = 1.6;
   std::vector<double> apart;
@@ -65,7 +65,7 @@ double first_period(std::span<const Change> changes) {
   return sum / count;
 }
 
-/// The frequency of a few changes, then of twice as many, until of all.
+/// The frequency from a few changes, then from twice as many, until all are used.
 double frequency_of(std::span<const Change> changes) {
   constexpr std::size_t first = 24;
   constexpr double first_reach = 0.15;
@@ -78,7 +78,7 @@ double frequency_of(std::span<const Change> changes) {
   }
 }
 
-/// What changes leave of the phase, but for a share of them: each says that its sample was between two rows.
+/// Range of the phase consistent with the changes, except a share of outliers: each sample was between two rows.
 struct PhaseRange {
   double low_s = 0.0, high_s = 0.0;
 };
@@ -95,8 +95,8 @@ PhaseRange phase_range(std::span<const Change> changes, double period_s, double 
   return {phase_s + low[at], phase_s + high[at]};
 }
 
-/// Period and phase in closer and closer steps: the period that leaves most of the phase, which is that of the middle
-/// of the log.
+/// Period and phase on successively finer grids: the period with the widest range of the phase, which refers to the
+/// middle of the log.
 EncoderSampling closest_sampling(std::span<const Change> changes, double period_s, double middle_s, double outliers) {
   constexpr int half = 20, rounds = 3;
   const double cycles = 0.5 * (changes.back().t_s - changes.front().t_s) / period_s;
@@ -151,7 +151,7 @@ std::optional<HeldSampling> held_sampling(std::span<const ServoSample> log) {
   const double hz = frequency_of(changes), spacing_s = 2.0 * changes[changes.size() / 2].half_s;
   if (!(std::abs(coherence(changes, hz)) > least_coherence) || !(1.0 / hz > 1.5 * spacing_s)) return std::nullopt;
   const double middle_s = 0.5 * (log.front().t_s + log.back().t_s);
-  for (const double outliers : {0.0, 0.02}) {  // of a sampling that is not quite regular
+  for (const double outliers : {0.0, 0.02}) {  // share, for a sampling that is not quite regular
     const EncoderSampling sampling = closest_sampling(changes, 1.0 / hz, middle_s, outliers);
     const PhaseRange range = phase_range(changes, sampling.period_s, sampling.phase_s, outliers);
     if (range.high_s < range.low_s && outliers == 0.0) continue;
@@ -166,7 +166,7 @@ std::vector<double> sampled_times(std::span<const ServoSample> log, const Encode
   for (std::size_t i = 0; i < log.size(); ++i) {
     cycles.push_back(sampling.cycle(log[i].t_s));
     if (i == 0 || log[i].angle_rad == log[i - 1].angle_rad) continue;
-    // A change is of the sample that was taken between the rows; the row before is of one before that.
+    // A change shows the sample that was taken between the two rows; the row before has an earlier one.
     const double sample = std::round((0.5 * (log[i - 1].t_s + log[i].t_s) - sampling.phase_s) / sampling.period_s);
     if (std::abs(cycles[i] - sample) <= 1.0) cycles[i] = std::max(cycles[i], sample);
     if (std::abs(cycles[i - 1] - sample) <= 1.0) cycles[i - 1] = std::min(cycles[i - 1], cycles[i] - 1.0);

@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Index;
 
-/// The log from a row on, read from there; commands that were given before it and may still wait to act are in it.
+/// The log from a row on; it also contains earlier commands that may not have taken effect yet.
 std::vector<ServoSample> part_from(std::span<const ServoSample> log, std::size_t row, double waiting_s) {
   const double from_s = log[row].t_s - waiting_s;
   const auto first =
@@ -23,7 +23,7 @@ std::vector<ServoSample> part_from(std::span<const ServoSample> log, std::size_t
   std::vector<ServoSample> part(log.begin() + static_cast<std::ptrdiff_t>(first), log.end());
   for (std::size_t i = 0; i < part.size(); ++i) {
     const bool is_before = first + i < row;
-    part[i].sampled_t_s = is_before ? log[row].t_s : part[i].t_s;  // one reading, which repeats
+    part[i].sampled_t_s = is_before ? log[row].t_s : part[i].t_s;  // repeats one reading
     if (is_before) part[i].angle_rad = log[row].angle_rad;
   }
   return part;
@@ -50,7 +50,7 @@ Parts parts_at(std::span<const ServoSample> log, const ServoFit& whole, std::siz
   return parts;
 }
 
-/// Where the parts leave least: of a grid, then between its points.
+/// The split with the smallest residuals: from a grid, then refined between its points.
 Parts best_parts(std::span<const ServoSample> log, const ServoFit& whole) {
   constexpr std::array<double, 7> shares{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
   const auto rows = static_cast<double>(log.size());
@@ -79,7 +79,7 @@ bool differs(const ServoChange& change, int param) {
 
 std::optional<ServoChange> servo_change(std::span<const ServoSample> log, const ServoFit& believed) {
   constexpr std::size_t least_rows = 200;
-  constexpr double max_correlation = 0.3, margin = 12.0, more = num_servo_params + 1.0;  // and the time
+  constexpr double max_correlation = 0.3, margin = 12.0, more = num_servo_params + 1.0;  // and the time of the change
   const bool is_held = std::ranges::any_of(log, [](const ServoSample& row) { return std::isfinite(row.sampled_t_s); });
   if (is_held || log.size() < least_rows) return std::nullopt;
   const ServoFit whole = refined(log, believed.kind, searched(log, believed.kind).params);

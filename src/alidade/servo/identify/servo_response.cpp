@@ -4,15 +4,15 @@
 namespace alidade {
 namespace {
 
-/// Angle and rate of a plant of gain one half-way through a log, with their derivatives by the parameters.
+/// Angle and rate of a plant during a log, with their derivatives by the parameters.
 struct Walk {
   ServoKind kind;
   double gain, tau_s;
   Decay decays{tau_s};
-  double x = 0.0, v = 0.0;  ///< Angle without its zero; rate (rate plants).
+  double x = 0.0, v = 0.0;  ///< Angle without its zero; rate (for rate plants).
   Eigen::RowVector<double, num_servo_params> dx = Eigen::RowVector<double, num_servo_params>::Zero(), dv = dx;
 
-  /// dt under one command: of an angle plant x, of a rate plant v goes towards gain · command.
+  /// Advances by dt with a constant command: x of an angle plant, or v of a rate plant, approaches gain · command.
   void advance(double dt_s, double command) {
     const auto [step_s, decay, rise] = decays.over(dt_s);
     const double goal = gain * command;
@@ -34,7 +34,7 @@ struct Walk {
     x += goal * dt_s + gap * reach_s;
     v = goal + decay * gap;
   }
-  /// A switch a little later: what pulled before goes on a little longer.
+  /// Derivative by a later switch: the previous command acts a little longer.
   void switch_command(double from, double to) {
     (kind == ServoKind::angle ? dx : dv)[ServoParam::latency] += gain * (from - to) / tau_s;
   }
@@ -55,7 +55,7 @@ ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, c
     walk.dv[ServoParam::start] = 1.0;
   }
   double now_s = std::min(log.front().t_s, times_s.front()), command = log.front().command;
-  std::size_t next = 1;  // the first command has been there before
+  std::size_t next = 1;  // the first command was in effect before
   for (Eigen::Index i = 0; i < num_rows; ++i) {
     const double t_s = times_s[static_cast<std::size_t>(i)];
     for (; next < log.size() && log[next].given_s() + params[ServoParam::latency] <= t_s; ++next) {

@@ -78,7 +78,7 @@ std::size_t num_zooms(const ObserveSolution& solution) {
   }));
 }
 
-/// Number of parameters that explain the pixels beside those of one camera.
+/// Number of parameters that explain the pixels, other than those of one camera.
 std::size_t num_explained_by(const ObserveSolution& solution) {
   return static_cast<std::size_t>(CommonLayout(solution.estimated).size) + solution.estimated_errors.size() +
          num_zooms(solution) + (solution.mounting_step ? 3 : 0);

@@ -53,7 +53,7 @@ struct AdjustConfig {
   bool reject = true;                ///< Reject observations beyond 6 σ.
   std::optional<CommonPrior> prior;  ///< None: a weak one, centred on each guess.
   RotatingCamera start;
-  /// Further initial guesses of fx = fy beside `start`, normalised, tried one after the other.
+  /// Further initial guesses of fx = fy besides `start`, normalised, tried one after the other.
   std::vector<double> other_starts;
   int max_iterations = 60;  ///< From each initial guess: a good one converges within a dozen.
   bool gives_up = false;    ///< Stop if convergence seems unlikely: for comparing solutions by their noise.

@@ -13,7 +13,7 @@ struct ObserveSetup : ObserveConfig {
   bool estimate_auto = false;                ///< Also estimate what the residuals indicate.
   bool lens_is_given = false;                ///< The pixels are undistorted with a given lens, which is not estimated.
   bool is_no_lever = false;                  ///< The estimated lever was implausible for a head: it is not tried again.
-  std::optional<double> sigma_k1;            ///< Of the given lens.
+  std::optional<double> sigma_k1;            ///< σ of k1 of the given lens.
 };
 
 /// Throws ConfigError as check_config() does.

@@ -231,7 +231,7 @@ std::optional<double> sigma_px_by_white(std::span<const TargetObservation> sorte
 }
 
 /// Estimates σ_px and σ_a if they are not given. The default σ_px stays unless the white part of the noise differs from
-/// it and the innovations are then more likely: a wrong rig would ask for a larger one as well.
+/// it and the innovations are then more likely: a wrong rig would require a larger one as well.
 void find_sigmas(std::span<const TargetObservation> sorted, std::span<const RigHead> heads, FollowConfig& config) {
   constexpr double min_gain = 5.0;
   const Probable usual = probable_sigma_a(sorted, heads, config);

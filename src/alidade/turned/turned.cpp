@@ -293,7 +293,7 @@ class TurnedRun {
 
   /// Assumptions that may change the answer: translation of the camera centre with rotation. A centre at ρ times the
   /// points' distance in front of the axes sees tan θ (1 + ρ / cos θ) for tan θ: f grows by ρ f, k1 by ρ/2, k2 by
-  /// −ρ/8; one beside them shifts cx, cy by ρ f.
+  /// −ρ/8; one to the side of them shifts cx, cy by ρ f.
   void add_given() {
     const Eigen::Vector2d f = report_.camera.head<2>();
     const double estimated = std::max(report_.parallax.relative, ordinary_parallax);
@@ -370,7 +370,7 @@ class TurnedRun {
 
   MatchedPhotos photos_;
   const TurnedConfig& config_;
-  TurnedConfig free_;  ///< With the fixed parameters free within typical priors, as a fixed value may be wrong.
+  TurnedConfig free_;  ///< The configuration with fixed parameters free within typical priors: they may be wrong.
   const Progress& progress_;
   PhotoScale scale_;
   TurnedReport report_;

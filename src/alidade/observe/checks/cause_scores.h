@@ -21,8 +21,8 @@ struct CauseScore {
   double gain = 0.0;  ///< Gain in twice the log-posterior with the typical σ as prior, less its penalty (BIC): the
                       ///< largest explains best.
   std::vector<CauseMember> members;
-  Eigen::MatrixXd information;  ///< Of the members, from these residuals and with their shared errors.
-  CommonVector shift;           ///< Of the estimated parameters if the cause were estimated too, normalised.
+  Eigen::MatrixXd information;  ///< Information on the members, with the errors that residuals share.
+  CommonVector shift;           ///< Shift of the estimated parameters with the cause estimated too.
   double from_s = not_seen;     ///< For a step: its instant [s].
 };
 
@@ -33,7 +33,7 @@ inline constexpr const char* step_cause = "step of the mounting";
 struct CauseConfig {
   ObserveNuisances nuisances;  ///< The estimated parameters.
   double max_gap_s = 0.25;
-  double height = 1.0;                   ///< Of the image, normalised: the path of a rolling shutter.
+  double height = 1.0;                   ///< Image height, normalised: path of a rolling shutter.
   std::vector<std::string> errors = {};  ///< Causes that were estimated as errors of the rotation.
   std::vector<double> steps_s = {};      ///< Candidate instants of a step of the mounting [s].
 };

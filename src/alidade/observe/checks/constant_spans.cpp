@@ -101,7 +101,7 @@ Eigen::VectorXd difference_of(const ObserveReport& a, const ObserveReport& b, Ei
 /// The difference of two answers in the `size` quantities from index `from`, if it exceeds their joint σ.
 struct Disagreement {
   Eigen::Index worst = 0;
-  double z = 0.0;  ///< Of the quantity that differs most.
+  double z = 0.0;  ///< Difference in σ of the quantity that differs most.
 };
 
 std::optional<Disagreement> disagreement_of(const ObserveReport& a, const ObserveReport& b, Eigen::Index from,

@@ -30,7 +30,7 @@ class EliminatedRotations {
 
  private:
   const BundleSolution& solution_;
-  BundleNormal normal_;    ///< Of the columns, without their own information, which is not needed.
+  BundleNormal normal_;    ///< Normal equations, without the columns' own information.
   BundleSlopes slopes_;    ///< Change of points and rotations per unit of the columns.
   Eigen::VectorXd alone_;  ///< Information of each column without elimination.
 };

@@ -125,7 +125,7 @@ std::vector<Span> spans_of(const std::vector<IntrinsicsEstimate>& rows) {
   return spans;
 }
 
-/// A change beside the intrinsics stays in the residuals: after one of the changes they are larger.
+/// A change of anything but the intrinsics stays in the residuals: after one of the changes they are larger.
 std::optional<Check> worst_span(const std::vector<IntrinsicsEstimate>& rows, const RotationLog& log) {
   constexpr double most = 1.25;  // over the variance elsewhere
   const std::vector<Span> spans = spans_of(rows);

@@ -25,7 +25,7 @@ constexpr int most_missing = 30;  // rows in one gap
 using Turn = Eigen::Matrix<double, 6, 1>;
 using ImageByTurn = Eigen::Matrix<double, 3, 6>;
 
-/// From an image to the next different one; `image` is none if they have too few points in common.
+/// A step from an image to the next different one; `image` is none if they have too few points in common.
 struct Step {
   std::size_t from = 0, to = 0;
   std::optional<ImageTurn> image;

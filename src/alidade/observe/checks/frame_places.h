@@ -17,7 +17,7 @@ struct FramePlaces {
   };
   std::vector<Gap> missing;
   std::vector<std::size_t> repeated;  ///< Rows whose pixels repeat those of the row before.
-  int num_inserted = 0;               ///< Of these, inserted ones: the images after them are one row too late each.
+  int num_inserted = 0;               ///< Of these, inserted ones: each makes the later images one row late.
   std::vector<int> later;             ///< Per image: how many rows after its own it was taken; empty: all in place.
 
   [[nodiscard]] bool are_as_given() const { return missing.empty() && repeated.empty(); }

@@ -20,7 +20,7 @@ constexpr std::size_t tracks_looked_at = 64;
 struct Part {
   explicit Part(Eigen::Index n = 0) : gradient(VectorXd::Zero(n)), information(MatrixXd::Zero(n, n)) {}
   VectorXd gradient;
-  MatrixXd information;  ///< Of a block: covariance of its score, with errors that last along tracks.
+  MatrixXd information;  ///< For a block: covariance of its score, with errors that last along tracks.
 };
 
 /// Decayed sum of a track's earlier scores, for exponentially correlated errors: Σ exp(−Δt/τ) Jᵀw.

@@ -8,8 +8,8 @@ namespace alidade {
 /// Covariance of an adjustment whose residuals share errors, in time (blur, a late clock, noise of the angles) and
 /// along the track of a point, and why it differs from that of the model.
 struct StatedCovariance {
-  CommonMatrix cov;           ///< Of the shared parameters, normalised; nowhere below the model's.
-  CommonMatrix lasting;       ///< With errors that last along tracks as estimated, and no other shared errors.
+  CommonMatrix cov;      ///< Covariance of the shared parameters, normalised; nowhere below the model's.
+  CommonMatrix lasting;  ///< Covariance with lasting errors along tracks as estimated, without other shared errors.
   Eigen::VectorXd inflation;  ///< σ over the model's.
   ClusterCovariance blocks;   ///< Blocks of time.
   double correlation_s = 0.0, block_s = 0.0;

@@ -156,7 +156,7 @@ void add_fixed_centre(const ObserveSetup& config, const ObserveSolution& report,
   }
 }
 
-/// One row for the changes of a zoom lens beside focal length and principal point. It does not affect the verdict.
+/// One row for changes of a zoom lens other than those of focal length and centre. It does not affect the verdict.
 void add_zoomed_lens(const ObserveSolution& report, std::vector<Assumption>& assumed) {
   constexpr double clearly_zoomed = 1.02;
   double least = std::numeric_limits<double>::infinity(), most = 0.0;

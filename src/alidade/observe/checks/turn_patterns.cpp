@@ -204,7 +204,7 @@ std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_
   return errors;
 }
 
-/// By differences: the rotations are smooth functions of the measured values.
+/// Numerical differentiation: the rotations are smooth functions of the measured values.
 std::vector<TurnPattern> turn_patterns(const RotationLog& log, const std::vector<RotationError>& errors,
                                        double max_gap_s) {
   if (log.rows.empty() || errors.empty()) return {};

@@ -47,7 +47,7 @@ class ArrowheadFilter {
   struct Hypothesis {
     double nis = 0.0;
     CommonVector step;
-    CommonMatrix point_change;  ///< What the points' slopes are multiplied by, less the identity.
+    CommonMatrix point_change;  ///< Matrix by which the points' slopes are multiplied, minus the identity.
   };
   [[nodiscard]] Hypothesis with_added_variance(const CommonVector& variance) const;
   /// Squared innovation of a point after the step of the hypothesis, over its variance.
@@ -85,7 +85,7 @@ class ArrowheadFilter {
     Eigen::Matrix<double, 2, 3> J_point;
     PixelByCommon through_point;  ///< ∂px/∂c through the point's slope alone.
     PixelByCommon by_common;      ///< ∂px/∂c through c and through the point's slope.
-    Eigen::Matrix2d inverse_cov;  ///< Of the innovation given c.
+    Eigen::Matrix2d inverse_cov;  ///< Inverse covariance of the innovation given c.
   };
 
   void accumulate();
@@ -97,7 +97,7 @@ class ArrowheadFilter {
   bool with_depth_;
   double variance_px_ = 1e-6;
   RotatingCamera camera_;
-  CommonMatrix covariance_, precision_;  ///< Of the shared parameters, and its inverse.
+  CommonMatrix covariance_, precision_;  ///< Covariance of the shared parameters, and its inverse.
   std::vector<Point> points_;
   std::vector<Seen> seen_;
   std::vector<bool> was_rejected_;  ///< One per point.

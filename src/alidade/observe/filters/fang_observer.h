@@ -41,8 +41,8 @@ struct FangConfig {
   std::optional<Eigen::Matrix<double, 8, 8>> mean_gramian;
   double excitation_period_s = 7.854;
   // For profile kalman only.
-  double sigma_px = 0.3;                                          ///< Of one coordinate of one point.
-  double prior_sigma_f_px = 200.0, prior_sigma_centre_px = 50.0;  ///< Of `start`.
+  double sigma_px = 0.3;                                          ///< σ of one coordinate of one point.
+  double prior_sigma_f_px = 200.0, prior_sigma_centre_px = 50.0;  ///< σ of `start`.
   /// Added to the variance of each θ: the prior above is linearised at `start`, and a tight one could never be left.
   double prior_floor = 1e-6;
   double drift_px_per_sqrt_s = 0.0219;  ///< Random walk of each ξ: 10⁻⁵ scaled pixels at 30 Hz.

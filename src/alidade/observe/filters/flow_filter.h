@@ -12,7 +12,7 @@ struct FlowFilterConfig {
   std::size_t num_points = 0;  ///< Number of pixels in each frame.
   PixelScale scale;
   Eigen::Vector4d start{1.0, 1.0, 0.0, 0.0};  ///< Initial fx, fy, cx, cy [px]: a weak prior, any values will do.
-  double sigma_px = 0.3;                      ///< Of one coordinate.
+  double sigma_px = 0.3;                      ///< σ of one coordinate.
   /// False: ten columns, as if the camera never rotated about its optical axis. For comparison.
   bool roll_columns = true;
   /// Uses the rates measured at both ends of a step, as the paper would, instead of the mean

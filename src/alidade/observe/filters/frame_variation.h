@@ -22,7 +22,7 @@ struct FocalVariation {
 /// F test: how much of the residuals of an adjustment a separate rotation per frame would explain.
 struct RotationJitter {
   double f_ratio = 0.0;        ///< Explained per frame over residual per degree of freedom; about 1 by chance.
-  double variance_rad2 = 0.0;  ///< Of a rotation about an axis across the view, beyond chance.
+  double variance_rad2 = 0.0;  ///< Variance of a rotation about an axis across the view, beyond chance.
   double within_frames = 0.0;  ///< σ of a pixel relative to the rotation of its frame, in the units of the adjustment.
   double lasts = 0.0;          ///< Correlation from frame to frame: 0 for noise, larger for model errors.
 

@@ -15,7 +15,7 @@ struct HybridConfig {
   bool no_zoom = false;         ///< No change is interpreted as a zoom.
   bool start_is_given = false;  ///< Otherwise several focal lengths are tried.
   double sigma_px = 0.0;        ///< [px]; 0: estimated from the residuals.
-  double sigma_range_m = 0.0;   ///< Of the ranges in the frames.
+  double sigma_range_m = 0.0;   ///< σ of the ranges in the frames.
   std::size_t range_point = 0;
   double bootstrap_s = 1.0;
   std::size_t buffer_frames = 300;  ///< Number of frames kept for adjustments.
@@ -105,7 +105,7 @@ class HybridObserver {
   HybridConfig config_;
   ArrowheadFilter filter_;
   FrameBuffer buffer_;
-  std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
+  std::vector<Eigen::Vector2d> px_;  ///< The pixels of this frame, normalised.
   std::vector<int> frames_out_;      ///< One per point: number of consecutive frames in which it was rejected,
   std::vector<int> patience_;        ///< and the number after which it is reinitialised.
   ArrowheadFilter candidate_;        ///< The filter under the hypothesis that the last frame was a zoom.
@@ -121,13 +121,13 @@ class HybridObserver {
   bool has_fit_ = true;         ///< Whether the last frame with pixels fitted;
   double unfit_since_s_ = 0.0;  ///< if not, the time since which none has.
   double drift_from_s_ = 0.0;   ///< Last frame before the current score window: a zoom may begin after it.
-  Eigen::Vector4d rejected_step_ = Eigen::Vector4d::Zero();      ///< Of fx, fy, cx, cy, from a rejected frame.
+  Eigen::Vector4d rejected_step_ = Eigen::Vector4d::Zero();      ///< Step of fx, fy, cx, cy for a rejected frame.
   std::vector<ConstantSpan> constant_spans_;                     ///< Before the last change of the intrinsics.
-  Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, after the last adjustment.
+  Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Variance of fx, fy after the last adjustment.
   int frames_since_adjustment_ = 0;
   double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over the frames that fit: estimates the noise.
   bool is_zooming_ = false;
-  Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();      ///< Of the change per frame in a zoom, recently.
+  Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();      ///< Variance of the change per frame in a zoom.
   int frames_to_settle_ = 0;                                     ///< After its end, a zoom may still go on slowly,
   Eigen::Vector4d settling_variance_ = Eigen::Vector4d::Zero();  ///< with this variance per frame.
   std::array<Eigen::Vector4d, settled_frames> past_k_;

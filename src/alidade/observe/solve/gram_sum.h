@@ -26,7 +26,7 @@ class GramSum {
 
  private:
   static constexpr Eigen::Index batch = 64;
-  Eigen::MatrixXd columns_;  ///< Of J, transposed, each times the square root of its weight.
+  Eigen::MatrixXd columns_;  ///< Columns of Jᵀ, each times the square root of its weight.
   Eigen::Index used_ = 0;
   Eigen::MatrixXd* sum_ = nullptr;
 };

@@ -37,9 +37,9 @@ struct RotationBundle {
 struct RotationBundleConfig {
   ObserveNuisances nuisances;
   bool with_depth = false;  ///< Points have a depth: needed for a lever arm or a measured velocity.
-  double sigma_px = 1e-3;   ///< Of each observation, normalised.
+  double sigma_px = 1e-3;   ///< σ of each observation's coordinates, normalised.
   double sigma_range_m = 1e-3;
-  double sigma_rotation_rad = 0.0;  ///< Of each frame's rotation, with nuisances.rotation; infinite: not measured.
+  double sigma_rotation_rad = 0.0;  ///< σ of each frame's rotation, with nuisances.rotation; infinite: not measured.
   double sigma_rate_rad_per_s =
       0.0;             ///< If positive, rotations are integrated rates with this white noise per sample: a random walk.
   double huber = 2.5;  ///< Huber threshold [σ]: larger residuals are downweighted. 0: least squares.
@@ -53,7 +53,7 @@ struct CommonPrior {
   RotatingCamera mean;
   Eigen::Vector4d sigma_k;           ///< fx, fy: half their value; cx, cy: a quarter of the image.
   std::array<bool, 4> is_given_k{};  ///< sigma_k is given by the user, not weak.
-  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, if given (square pixels).
+  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< σ of fx − fy, if given (square pixels).
   double sigma_k1 = 0.5;                                          ///< k2, k3 too.
   double sigma_tangential = 0.05;
   double sigma_mount_rad = 0.2;
@@ -61,7 +61,7 @@ struct CommonPrior {
   double sigma_lever_m = 0.3;
   double sigma_shutter_s = 0.05;
   double sigma_drift_per_s = 0.01;
-  double sigma_error = 1.0;  ///< Of errors of the rotation, in units of their typical sizes: counts as given.
+  double sigma_error = 1.0;  ///< σ of errors of the rotation, in units of their typical sizes: counts as given.
 
   [[nodiscard]] CommonMatrix information(const CommonLayout& layout) const;
   /// Only the part that the user gave.
@@ -86,20 +86,20 @@ struct BundleSolution {
   RotatingCamera camera;
   std::vector<BearingPoint> points;
   std::vector<Eigen::Quaterniond> mount_from_start;  ///< One per frame, including the estimated rotation.
-  CommonMatrix information;  ///< Of the shared parameters except rotation, all else eliminated, without prior, in
-                             ///< units of 1/σ².
+  CommonMatrix information;  ///< Information on the shared parameters except rotation, without prior and with all
+                             ///< else eliminated, in units of 1/σ².
   CommonMatrix prior_information;
   CommonVector prior_gradient;                 ///< Gradient of half the prior's cost.
   CommonMatrix given_information;              ///< The part of the prior that the user gave.
   std::vector<PointGivenCommon> given_common;  ///< One per point; empty if rotations are estimated.
   // If the rotation of each frame is estimated, one per frame:
-  std::vector<Eigen::Vector3d> rotation_errors;   ///< Of the measured rotation [rad].
+  std::vector<Eigen::Vector3d> rotation_errors;   ///< Errors of the measured rotation [rad].
   std::vector<double> rotation_information;       ///< 1/σ² of the rotation, or of its step from the frame before.
   std::vector<double> rotation_information_seen;  ///< Added by the frame's own pixels, mean over three axes.
   bool rotations_walk = false;                    ///< True: the prior is a random walk (steps).
   std::vector<Eigen::Vector2d> residuals;         ///< Prediction minus pixel, one per observation, normalised.
   std::vector<double> residual_px;                ///< Their norms.
-  double sum_squares = 0.0;                       ///< Of the weighted residuals over σ.
+  double sum_squares = 0.0;                       ///< Sum of squares of the weighted residuals over σ.
   double rms_px = 0.0;                            ///< Per coordinate, normalised, unweighted.
   int dof = 0;                                    ///< Measurements minus unknowns.
 

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// The parameters that are estimated beside fx, fy, cx, cy.
+/// The parameters that are estimated in addition to fx, fy, cx, cy.
 struct ObserveNuisances {
   bool k1 = false;  ///< Radial distortion: x (1 + k1 r² + k2 r⁴ + k3 r⁶) on coordinates over the focal length.
   bool k2 = false;

@@ -25,21 +25,21 @@ struct MountingStep {
 /// The report with the intermediate results on which its verdict, bound and tests are based.
 struct ObserveSolution : ObserveReport {
   PixelScale scale;
-  double gramian_lambda_min = -1.0;  ///< Of fang2011; −1: not computed.
+  double gramian_lambda_min = -1.0;  ///< Smallest eigenvalue of fang2011's Gramian; −1: not computed.
   std::size_t rows_used = 0;
   std::size_t pixels_rejected = 0;
   /// The reference: the rows of the longest span with constant intrinsics, adjusted together.
   /// The bound is from its information.
   Adjustment reference;
-  StatedCovariance stated;                                   ///< Of the reference.
-  RotationJitter jitter;                                     ///< Of the reference's frames.
+  StatedCovariance stated;                                   ///< Covariance of the reference.
+  RotationJitter jitter;                                     ///< Jitter of the reference's frames.
   std::vector<CauseScore> causes;                            ///< Score tests of the parameters that were assumed exact.
-  std::vector<HybridObserver::ConstantSpan> constant_spans;  ///< Of ObserveMethod::hybrid.
+  std::vector<HybridObserver::ConstantSpan> constant_spans;  ///< Spans found by ObserveMethod::hybrid.
   /// The answer minus the reference over their σ, the largest of fx, fy, cx, cy, if both are of the same camera.
   double from_reference = 0.0;
-  ObserveNuisances estimated;  ///< What was estimated in the end beside fx, fy, cx, cy.
+  ObserveNuisances estimated;  ///< What was estimated in the end in addition to fx, fy, cx, cy.
   std::vector<std::string> estimated_errors;
-  RotationErrors errors;           ///< Of the rotation, as estimated, in units of their typical sizes.
+  RotationErrors errors;           ///< Estimated errors of the rotation, in units of their typical sizes.
   std::vector<Check> side_checks;  ///< What explains the residuals equally well, and what the pixels do not determine.
   std::optional<MountingStep> mounting_step;
   std::string misread;             ///< How the rotation seems to be misread, in words; empty: it is not.

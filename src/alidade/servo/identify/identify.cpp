@@ -67,7 +67,7 @@ ServoIdentification::Status status_of(const ServoFit& fit) {
 
 /// Fits for both kinds of plant, with everything else found in the log.
 struct Solution {
-  std::vector<ServoSample> log;  ///< With the commands' times.
+  std::vector<ServoSample> log;  ///< The log with the times of the commands.
   std::array<ServoFit, 2> fits;
   std::array<std::vector<ServoRival>, 2> rivals;
   std::size_t believed = 0;
@@ -195,8 +195,8 @@ Explained with_a_fault(const Solution& before, ServoKindRule rule) {
   return best;
 }
 
-/// With faults of the log that are not due to the axis, if they explain more than flaws of the axis do and leave no
-/// structure: effects of the axis beyond the model may look like either.
+/// The solution with faults of the log that are not due to the axis, if they explain more than flaws
+/// of the axis and leave no structure: effects of the axis beyond the model may look like either.
 Solution with_faults_tried(const Solution& before, ServoKindRule rule) {
   constexpr double clear = 12.0;
   constexpr int most = 3;
@@ -267,8 +267,8 @@ Explained most_resonant(const Solution& as_logged, const Solution& believed, Ser
   return best;
 }
 
-/// With a resonance, if the log indicates one and it explains clearly more. Tried after everything else, since many
-/// effects look like it, and never for commands of a single size, which do not distinguish these.
+/// The solution with a resonance, if the log indicates one and it explains clearly more. Tried after everything
+/// else, as many effects look like it, and never for commands of a single size, which do not distinguish these.
 Solution with_resonance_tried(const Solution& as_logged, const Solution& believed, ServoKindRule rule) {
   constexpr std::size_t several = 2;
   constexpr double margin = 12.0, clear = 10.0, beside_others = 40.0;

@@ -79,7 +79,7 @@ LinearFit searched(std::span<const ServoSample> log, ServoKind kind, bool by_sig
       keep_better(turning, fit_of(with_column(std::move(A), at_s), readings, tau_s, latency_s));
     }
   }
-  // For a rate plant, a drift besides its command may hide all other effects.
+  // For a rate plant, a drift independent of its command may hide all other effects.
   if (turning.sum2 < clearly * best.sum2) return turning;
   return best;
 }

@@ -48,7 +48,7 @@ double first_latency(const PositionerLog& log) {
   return waits.empty() ? 0.05 : median_of(std::move(waits));
 }
 
-/// From the best points of a coarse grid, as the cost has several local minima. All readings have full weight: with the
+/// Best fit from several points of a coarse grid, as the cost has local minima. All readings have full weight: with the
 /// logarithmic loss, giving up a whole move can cost less than the sampling of an encoder does in total.
 PositionerVector best_start(const PositionerProblem& problem, double rate, double latency) {
   constexpr std::size_t num_starts = 4;

@@ -7,12 +7,12 @@
 
 namespace alidade {
 
-/// Where one axis was between two readings: by its model and the commands, plus what the readings are beside that.
+/// Position of one axis between two readings: from its model and the commands, plus the deviation of the readings.
 class AxisCourse {
  public:
   AxisCourse(const PositionerParams& axis, double start_rad, double t_s);
 
-  /// In order of time.
+  /// In chronological order.
   void read(double t_s, double angle_rad);
   void send(double t_s, double target_rad);
   /// Between the readings of the last two seconds; none: before or after them.
@@ -23,7 +23,7 @@ class AxisCourse {
     double t_s, model_rad;
   };
   struct Reading {
-    double t_s, angle_rad, beside_rad;  ///< `beside`: reading less model.
+    double t_s, angle_rad, beside_rad;  ///< `beside`: reading minus model.
   };
   void advance(double t_s);
 

@@ -13,13 +13,13 @@ struct HeadServerConfig {
   SimulatedHeadConfig head;
   SimulatedCamera camera;
   std::string address = "127.0.0.1";
-  int rotctl_port = -1, stream_port = -1, onvif_port = -1;  ///< 0: any that is free; −1: not served.
-  std::string user, password;                               ///< Of ONVIF; no user: everybody may ask.
-  std::string truth_csv;                                    ///< Where truth is written, line by line; empty: nowhere.
+  int rotctl_port = -1, stream_port = -1, onvif_port = -1;  ///< 0: any free port; −1: not served.
+  std::string user, password;                               ///< For ONVIF; no user: open to everybody.
+  std::string truth_csv;                                    ///< File for the true positions, line by line; empty: none.
 };
 
-/// A simulated head behind the protocol of Hamlib's rotctld, and what its camera sees as motion JPEG over HTTP
-/// (/stream.mjpg; X-Timestamp says when a frame was taken), and as an ONVIF camera. At most 16 clients each. Throws
+/// A simulated head behind the protocol of Hamlib's rotctld, its camera as motion JPEG over HTTP
+/// (/stream.mjpg; X-Timestamp is the exposure time), and as an ONVIF camera. At most 16 clients each. Throws
 /// InputError: a port is in use, the file cannot be written.
 class HeadServer {
  public:
@@ -39,7 +39,7 @@ class HeadServer {
   std::unique_ptr<State> state_;
 };
 
-/// What rotctld answers to a line; none: the client wants to go.
+/// The reply of rotctld to a line; none: the client quits.
 [[nodiscard]] std::optional<std::string> rotctl_answer(HeadPlant& plant, const std::string& line, double t_s);
 
 }  // namespace alidade

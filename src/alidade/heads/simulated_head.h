@@ -14,25 +14,25 @@
 
 namespace alidade {
 
-/// What a head may do instead of what it says.
+/// Faults of a head: what it does instead of what it reports.
 enum class HeadLie {
   none,
-  refuses,         ///< Says yes to commands and does not move.
-  reports_target,  ///< Reads where it shall be, not where it is.
-  silent,          ///< Answers nothing any more.
-  not_a_number,    ///< Reads NaN.
-  frozen,          ///< Moves, and reads where it was.
-  zoom_moves_pan   ///< A command of zoom alone moves pan as well.
+  refuses,         ///< Accepts commands and does not move.
+  reports_target,  ///< Reports its target, not its position.
+  silent,          ///< Stops replying.
+  not_a_number,    ///< Reports NaN.
+  frozen,          ///< Moves, and reports its old position.
+  zoom_moves_pan   ///< A zoom command alone moves pan as well.
 };
 
-/// A head that somebody might own. Both axes are alike.
+/// A realistic head. Both axes are alike.
 struct SimulatedHeadConfig {
   PositionerParams axis;
   double step_rad = 0.01 * 0.017453292519943295;  ///< Of the encoder.
-  double update_hz = 0.0;                         ///< Of the encoder; 0: read when it is asked.
+  double update_hz = 0.0;                         ///< Of the encoder; 0: read on request.
   double command_step_rad = 0.0;                  ///< Commands are rounded to multiples of it; 0: they are not.
   bool has_zoom = false;
-  double repeatability_rad = 0.0;  ///< σ of where a command ends.
+  double repeatability_rad = 0.0;  ///< σ of the final position of a command.
   Eigen::Vector2d low_rad{-2.96705972839036, -0.523598775598299};
   Eigen::Vector2d high_rad{2.96705972839036, 1.047197551196598};
   double watchdog_s = 0.0;      ///< Silence after which it stops by itself; 0: never.
@@ -41,29 +41,29 @@ struct SimulatedHeadConfig {
   std::uint64_t seed = 1;
 };
 
-/// A plant that `seed` draws: rate 10–90°/s, acceleration 80–400°/s², time constant 0.04–0.15 s, latency 10–150 ms,
-/// backlash and dead band often, an encoder of 0.01–0.05° that is read when asked or 20 or 50 times a second.
+/// A plant drawn with `seed`: rate 10–90°/s, acceleration 80–400°/s², time constant 0.04–0.15 s, latency 10–150 ms,
+/// backlash and dead band often, an encoder of 0.01–0.05° that is read on request or 20 or 50 times a second.
 [[nodiscard]] SimulatedHeadConfig drawn_head(std::uint64_t seed);
 
-/// The config of "KEY=VALUE&KEY=VALUE" (or separated by commas): seed, rate, accel, backlash, dead_band, step, grid,
+/// The config from "KEY=VALUE&KEY=VALUE" (or separated by commas): seed, rate, accel, backlash, dead_band, step, grid,
 /// repeat in degrees and their rates; tau, latency, watchdog in seconds; update_hz; zoom; lie. Throws InputError, which
-/// names all keys where one is not known.
+/// lists all keys if one is unknown.
 [[nodiscard]] SimulatedHeadConfig simulated_head_config(const std::string& text, const std::string& where);
 
-/// The plant in time. From any thread; times never go back.
+/// The plant over time. Thread-safe; times never decrease.
 class HeadPlant {
  public:
   HeadPlant(const SimulatedHeadConfig& config, double t_s);
   void go_to(double t_s, const Eigen::Vector2d& pan_tilt_rad);
   void stop(double t_s);
   [[nodiscard]] Eigen::Vector2d reading(double t_s);
-  [[nodiscard]] Eigen::Vector2d truth(double t_s);  ///< Of what a camera on it looks along.
-  /// Turns towards the signs of `direction`, at its largest rate, until `until_s` or the next command.
+  [[nodiscard]] Eigen::Vector2d truth(double t_s);  ///< True direction of a camera on it.
+  /// Moves in the directions of the signs, at its largest rate, until `until_s` or the next command.
   void turn(double t_s, const Eigen::Vector2d& direction, double until_s);
   void zoom_to(double t_s, double share);
   [[nodiscard]] double zoom() const { return zoom_; }
   [[nodiscard]] bool is_at_rest(double t_s);
-  /// Somebody spoke: the watchdog counts from here.
+  /// A client has spoken: the watchdog restarts.
   void hear(double t_s);
   [[nodiscard]] bool does(HeadLie lie, double t_s) const;
   [[nodiscard]] const SimulatedHeadConfig& config() const { return config_; }
@@ -87,10 +87,10 @@ class HeadPlant {
   std::uint64_t draws_ = 0;
 };
 
-/// Of a head that is simulated in this program; null: it is another.
+/// For a head simulated in this program; null: it is another.
 [[nodiscard]] HeadPlant* plant_of(HeadDevice& head);
 
-/// sim://?seed=3: such a head in this program. `clock=free`: in a time of its own, as fast as it is asked.
+/// sim://?seed=3: such a head in this program. `clock=free`: with its own time, which runs as fast as it is asked.
 [[nodiscard]] std::unique_ptr<HeadDevice> open_simulated_head(const std::string& url);
 
 }  // namespace alidade

@@ -19,27 +19,27 @@ struct SeenFrame {
   std::vector<TrackedPoint> points;
 };
 
-/// A straight piece of the head's way.
+/// A straight part of the head's path.
 struct HeadLine {
   Eigen::Vector2d pan_tilt_rad, rate_rad_s;
 };
 
-/// How a head was seen to move: the smallest change of what it reads, its largest rate, and how often it was read.
+/// Observed motion of a head: the smallest change of its readings, its largest rate, and the interval of readings.
 struct HeadManner {
-  double period_s = 0.0;  ///< Between readings: the median.
+  double period_s = 0.0;  ///< Median interval between readings.
   Eigen::Vector2d step_rad = Eigen::Vector2d::Zero(), fastest_rad_s = Eigen::Vector2d::Zero();
 };
 [[nodiscard]] HeadManner manner_of(std::span<const HeadPosition> readings);
 
-/// Pan and tilt at a time, where the head moves evenly (or stands) from a little before `from_s` to a little after
-/// `until_s`: the line through what was read. None: it starts, stops or turns there, or how long its answers took
-/// leaves that open: each reading is of some instant between question and answer. Where it stands answers may be slow;
-/// where it moves all have to be as slow as each other, and what they have in common is in the delay.
+/// Pan and tilt at a time, if the head moves uniformly (or is at rest) from a little before `from_s` to a little after
+/// `until_s`: the line through the readings. None: it starts, stops or reverses there, or its response times leave that
+/// open: each reading is from some instant between request and reply. At rest, replies may be slow; in motion,
+/// all must be equally slow, and their common delay is part of the delay.
 [[nodiscard]] std::optional<HeadLine> even_motion(std::span<const HeadPosition> readings, const HeadManner& manner,
                                                   double t_s, double from_s, double until_s);
 
-/// A rotation log of the frames that were taken in even motion; two rows without pixels before each give its rate.
-/// `late_s`: frames are believed to show what was so much earlier.
+/// A rotation log of the frames taken in uniform motion; two rows without pixels before each give its rate.
+/// `late_s`: frames are assumed to show the scene this much earlier.
 [[nodiscard]] RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const SeenFrame> frames,
                                    double late_s, double origin_s);
 

@@ -4,8 +4,8 @@
 
 namespace alidade::live {
 
-/// Lets through so many a second at most, evenly where more come: in no second more than `max_hz`. Time is an
-/// argument, in order.
+/// Passes at most a number of messages per second, evenly spaced if there are more: in no second more than `max_hz`.
+/// Time is an argument and must not decrease.
 class RateLimit {
  public:
   explicit RateLimit(double max_hz) : max_hz_(max_hz) {}

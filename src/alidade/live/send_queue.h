@@ -7,7 +7,7 @@
 
 namespace alidade::live {
 
-/// What a message is, which decides what goes first where a client reads too slowly.
+/// Kind of a message, which decides what is dropped first if a client reads too slowly.
 enum class MessageKind {
   image,    ///< Dropped first,
   step,     ///< then these,
@@ -19,24 +19,24 @@ struct Outgoing {
   bool is_text = false;
   std::string head;                         ///< Sent before the body.
   std::shared_ptr<const std::string> body;  ///< Shared by all clients; null: nothing behind the head.
-  std::uint32_t replaces = 0;               ///< Of control: an older one of the same number > 0 is taken out.
+  std::uint32_t replaces = 0;               ///< For control messages: an older one with the same number > 0 is removed.
 
   [[nodiscard]] std::size_t size() const { return head.size() + (body ? body->size() : 0); }
 };
 
-/// What waits for one client, in order and never more than so many bytes: a client that stops reading costs memory of
+/// Messages that wait for one client, in order and limited in bytes: a client that stops reading costs memory of
 /// that size, and no time.
 class SendQueue {
  public:
   explicit SendQueue(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
-  /// Drops the oldest images, then the oldest steps, where it does not fit otherwise.
+  /// Drops the oldest images, then the oldest steps, if it does not fit otherwise.
   void push(Outgoing message);
   [[nodiscard]] Outgoing pop();
   [[nodiscard]] bool is_empty() const { return waiting_.empty(); }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
-  /// How many were dropped since this was last asked.
+  /// Number of messages dropped since the last call.
   struct Dropped {
     std::size_t images = 0, steps = 0;
   };

@@ -15,28 +15,28 @@
 
 namespace alidade::live {
 
-/// How a topic's messages are kept for clients that come later, and which go first where one is too slow.
+/// How messages of a topic are kept for clients that connect later, and which are dropped first if one is too slow.
 enum class TopicKind {
   steps,   ///< Those of the last minute are kept.
   images,  ///< The newest is kept; dropped before steps.
-  latest,  ///< Each replaces the one before: a scene, a calibration. Never dropped.
+  latest,  ///< Each replaces the previous one: a scene, a calibration. Never dropped.
 };
 
 struct Topic {
   Channel channel;
   TopicKind kind = TopicKind::steps;
-  double max_hz = 60.0;   ///< Messages a second, of all lanes.
-  std::size_t lanes = 1;  ///< Each has its share: heads, of which none is to hide another.
+  double max_hz = 60.0;   ///< Messages per second, over all lanes.
+  std::size_t lanes = 1;  ///< Number of lanes with separate shares: heads, none of which may starve another.
 };
 
 struct KeptMessage {
-  std::uint64_t t_ns = 0;  ///< Its own time.
+  std::uint64_t t_ns = 0;  ///< Time of the message.
   double at_s = 0.0;       ///< When it was sent.
   std::shared_ptr<const std::string> body;
 };
 
-/// The topics of a server with their limits and what is kept of them. Limits may be asked by any thread, the rest is
-/// the server's thread's.
+/// The topics of a server with their limits and kept messages. Limits may be queried by any thread, the rest belongs to
+/// the server's thread.
 class TopicStore {
  public:
   explicit TopicStore(const std::vector<Topic>& topics);
@@ -54,30 +54,30 @@ class TopicStore {
  private:
   struct State {
     Topic topic;
-    std::mutex mutex;  ///< Of the limits.
+    std::mutex mutex;  ///< Protects the limits.
     std::vector<RateLimit> limits;
     std::deque<KeptMessage> kept;
   };
   std::vector<std::unique_ptr<State>> topics_;
 };
 
-/// One client as the server sees it, without its socket: what it subscribed to, and what waits for it.
+/// One client of the server, without its socket: its subscriptions, and the messages that wait for it.
 class Feed {
  public:
   Feed(const TopicStore& topics, std::string_view session_id);
 
-  /// What the client said. Never throws: what is wrong is answered with a status.
+  /// A message from the client. Never throws: errors are answered with a status.
   void hear(std::string_view text);
   void warn(std::string_view what);
-  /// To all its subscriptions of a topic.
+  /// Sends to all its subscriptions of a topic.
   void offer(std::size_t index, const KeptMessage& message);
   void tell(StatusLevel level, std::string_view message);
-  /// Replaces one that still waits.
+  /// Replaces one that is still waiting.
   void tell_time(std::uint64_t t_ns);
 
   [[nodiscard]] bool has_next() const { return !queue_.is_empty(); }
   [[nodiscard]] Outgoing next() { return queue_.pop(); }
-  /// Says at most each two seconds what was dropped.
+  /// Reports at most every two seconds what was dropped.
   void note_dropped(double now_s);
   [[nodiscard]] bool subscribes_to(std::size_t index) const;
   [[nodiscard]] const SendQueue& queue() const { return queue_; }

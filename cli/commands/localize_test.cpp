@@ -197,9 +197,8 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
   expect(header + "0,0,1,1,1\n0,0.1,2,1,1\n", "differs from the first row of frame 0");
   expect(header + "0,0,1,1,1\n0,0,1,2,2\n", "1 appears twice in frame 0");
   expect(header + "0,0,-3,1,1\n", "column 'point_id'");
-  EXPECT_EQ(localize({"--distortion", "some"}).code, 2);
-  EXPECT_EQ(localize({"--sigma-px", "0"}).code, 2);
-  EXPECT_EQ(localize({"--rate", "nan"}).code, 2);
+  for (const auto& [option, value] : {std::pair("--distortion", "some"), {"--sigma-px", "0"}, {"--rate", "nan"}})
+    EXPECT_EQ(localize({option, value}).code, 2);
   const auto bad_file = [&](const char* option, const std::string& text, const std::string& what) {
     write_file(path("bad.yaml"), text);
     const Outcome outcome = localize({option, path("bad.yaml")});
@@ -213,11 +212,9 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
   bad_file("--target", "points: [{id: 1, x_m: 0, y_m: 0, z_m: 0}]\nseen_from: above\n", "is not +z or -z");
   bad_file("--target", "board: {corners: 3x3, square_m: 1}\nseen_from: +z\n", "is of points");
   bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [2, 0, 0, 0]\n", "has the length 2, not 1");
-  bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [1, 0, 0, 0]\nsigma_rate_rad_s: -1\n",
-           "is not above zero");
-  bad_file("--start",
-           "position_m: [0, 0, 0]\nquaternion_wxyz: [1, 0, 0, 0]\ndepths: [{id: 4, depth_m: 1}, {id: 4, depth_m: 2}]\n",
-           "depths[1].id: 4 appears twice");
+  const std::string start = "position_m: [0, 0, 0]\nquaternion_wxyz: [1, 0, 0, 0]\n";
+  bad_file("--start", start + "sigma_rate_rad_s: -1\n", "is not above zero");
+  bad_file("--start", start + "depths: [{id: 4, depth_m: 1}, {id: 4, depth_m: 2}]\n", "4 appears twice");
   bad_file("--truth", "0 1 2 3\n", "is not 't x y z qx qy qz qw'");
 }
 

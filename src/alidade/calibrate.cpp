@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <utility>
 
@@ -33,9 +34,21 @@ std::string outside_text(std::size_t num_outside, std::size_t num, const ImageSi
                      size.height_px);
 }
 
+/// The larger side of what holds all corners.
+double extent_px(std::span<const BoardView> views) {
+  Eigen::AlignedBox2d box;
+  for (const BoardView& view : views)
+    for (const Corner& corner : view.corners) box.extend(corner.px);
+  return box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
+}
+
 }  // namespace
 
 std::string outside_fault(std::span<const BoardView> views, const ImageSize& size) {
+  constexpr double least_px = 5.0;  // no board is seen in so few
+  const double extent = extent_px(views);
+  if (extent > 0.0 && extent < least_px)
+    return fmt::format("all corners lie within {:.2g} px, as in normalised coordinates: give them in pixels", extent);
   const auto [num_outside, num] = count_outside(views, size);
   return 10 * num_outside > num ? outside_text(num_outside, num, size) + ": check the size" : "";
 }

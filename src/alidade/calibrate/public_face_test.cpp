@@ -155,6 +155,20 @@ TEST(CalibrateFace, SaysThatCornersLieOutsideTheImages) {
   EXPECT_THROW((void)calibrate(views, {sample_size.width_px / 2, height_px}, sample_board), ConfigError);
 }
 
+TEST(CalibrateFace, NormalisedCoordinatesAreNoPixels) {
+  for (const Eigen::Vector2d& from : {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(320.0, 240.0)}) {
+    auto views = views_of(10);
+    for (BoardView& view : views)
+      for (Corner& corner : view.corners) corner.px = (corner.px - from) / 640.0;
+    try {
+      (void)calibrate(views, sample_size, sample_board);
+      ADD_FAILURE() << "is taken";
+    } catch (const ConfigError& error) {
+      EXPECT_THAT(error.what(), ::testing::HasSubstr("give them in pixels"));
+    }
+  }
+}
+
 /// 25 for 25 mm: the lens is right, the poses are kilometres away.
 TEST(CalibrateFace, NamesSquaresOfAnotherUnit) {
   for (const double square_m : {25.0, 25e-6, sample_board.square_m}) {

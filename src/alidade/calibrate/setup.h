@@ -16,7 +16,8 @@ namespace alidade {
 /// All faults of `config`, one sentence each; empty if it is usable.
 [[nodiscard]] std::vector<std::string> faults(const CalibrateConfig& config);
 
-/// What is wrong if more than one corner in ten lies outside the images, whose size then is another one; or empty.
+/// What is wrong if more than one corner in ten lies outside the images, whose size then is another one, or if all lie
+/// within a few pixels; or empty.
 [[nodiscard]] std::string outside_fault(std::span<const BoardView> views, const ImageSize& size);
 
 /// Number of usable views needed: three, or two if the principal point is fixed (Zhang 2000, §3.1).

@@ -134,13 +134,14 @@ void explain_disagreement(std::span<const ViewScore> scores, bool changes, Calib
 }
 
 /// Why photos disagree, by a change over them or without one.
-void heed_changes(LensChangeStudy change, const std::vector<ViewScore>& scores, const OrderTaken& taken,
-                  Calibration& result) {
+void heed_changes(LensChangeStudy change, const std::optional<Check>& flips, const std::vector<ViewScore>& scores,
+                  const OrderTaken& taken, Calibration& result) {
   const bool is_explained = result.verdict.state == State::good || has_a_cause(result);
   const auto motion = is_explained ? std::nullopt : readout_motion(result.board_views, result);
   const std::optional<PhotoEffect> effect = motion ? std::nullopt : effect_beside(change, scores, taken, result);
-  if (effect || motion) change.change.reset();
+  if (effect || motion || flips) change.change.reset();
   heed_change(change, taken.photos, result.verdict);
+  if (flips) return heed_kept_flips(*flips, result.verdict);
   if (motion) return heed_readout_motion(*motion, result.verdict);
   if (effect) return heed_photo_effect(*effect, result.verdict);
   if (result.verdict.state == State::good) return;
@@ -192,6 +193,17 @@ ModelErrors settle_model(Calibration& result) {
   return errors;
 }
 
+/// With all causes that are found: those of which photos disagree as well go first.
+void give_verdict(const std::optional<Check>& flips, LensChangeStudy change, const std::vector<ViewScore>& scores,
+                  const OrderTaken& taken, Calibration& result) {
+  result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
+  heed_flipped_photos(result, result.verdict);
+  heed_changes(std::move(change), flips, scores, taken, result);
+  if (const auto rival = rival_model(result.board, result.board_views, result.config, result))
+    heed_rival_model(*rival, result.verdict);
+  heed_assumptions(result.assumed, result.verdict);
+}
+
 }  // namespace
 
 Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
@@ -210,6 +222,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
     return result;
   }
   reject_flipped_photos(board, result.size, result.config, result.board_views, result);
+  const std::optional<Check> flips = kept_flips(board, result.config, result.board_views, result);
   const std::vector<ShapeTransfer> transfers = settle_shape(result, progress);
   const ModelErrors errors = settle_model(result);
   name_flipped_photos(board, result.board_views, result);
@@ -226,11 +239,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.study.lens_remedy = errors.is_of_lens ? errors.remedy : "";
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
-  result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
-  heed_changes(change, scores, taken, result);
-  if (const auto rival = rival_model(board, result.board_views, result.config, result))
-    heed_rival_model(*rival, result.verdict);
-  heed_assumptions(result.assumed, result.verdict);
+  give_verdict(flips, change, scores, taken, result);
   return result;
 }
 

@@ -141,6 +141,10 @@ bool differ(const Camera& a, const Camera& b) {
 
 }  // namespace
 
+std::vector<bool> divided_along(std::span<const ViewScore> scores, const VectorXd& direction) {
+  return divided(readings_of(scores, direction));
+}
+
 std::optional<TwoLenses> two_lenses(const Board& board, std::span<const BoardView> views,
                                     std::span<const ViewScore> scores, CalibrateConfig config,
                                     const CalibrateReport& report) {
@@ -161,7 +165,7 @@ std::optional<TwoLenses> two_lenses(const Board& board, std::span<const BoardVie
     VectorXd direction = VectorXd::Zero(lens.size());
     if (at == 0) direction.head<2>() = lens.head<2>();
     if (at > 0) direction[at + 1] = 1.0;
-    auto found = settled(board, some, divided(readings_of(scores_of_some, direction)), config, report);
+    auto found = settled(board, some, divided_along(scores_of_some, direction), config, report);
     if (found && (!best || shared_noise_px(*found) < shared_noise_px(*best))) best = std::move(found);
   }
   constexpr double far_less = 0.4;  // a lens that drifts evenly, divided in the middle: 0.5

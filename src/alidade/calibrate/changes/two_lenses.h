@@ -18,6 +18,10 @@ struct TwoLenses {
   double apart_px = 0.0, together_px = 0.0;  ///< shared_noise_px() with two cameras, and with one for all.
 };
 
+/// True for the views above the split that leaves the least scatter in both parts, ordered by the change of the lens
+/// along `direction` that each indicates.
+[[nodiscard]] std::vector<bool> divided_along(std::span<const ViewScore> scores, const Eigen::VectorXd& direction);
+
 /// Splits the views in two so that each part fits its own lens: they are ordered by the focal length (or cx, cy) that
 /// each indicates relative to the common lens, split where the remaining scatter is smallest, then calibrated and
 /// reassigned to the better-fitting lens until convergence. None if the photos of a part disagree nearly as much as

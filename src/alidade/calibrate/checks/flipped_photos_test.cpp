@@ -57,6 +57,62 @@ TEST(FlippedPhotos, AreNamedOfABoardThatIsGiven) {
   EXPECT_THAT(result.views[4].reason, ::testing::HasSubstr("mirrored left to right they do"));
 }
 
+/// A third of the photos, and half of them: which are right then only their number says.
+TEST(FlippedPhotos, AreNamedWhereTheyAreMany) {
+  struct Case {
+    bool u, v;
+    std::size_t every;
+    const char* words;
+  };
+  for (const Case& flip :
+       {Case{true, true, 3, "rotated by 180° they do"}, Case{true, true, 2, "rotated by 180° they do"},
+        Case{true, false, 3, "mirrored left to right they do"}}) {
+    constexpr std::uint64_t seed = 5;
+    const Camera camera = testing::sample_camera("brown", {{"cx", 326.0}, {"cy", 232.0}});
+    const BoardScene scene = testing::covered_scene(camera, 22, seed);
+    std::vector<BoardView> views = testing::sample_views(scene, seed);
+    for (std::size_t k = 0; k < views.size(); k += flip.every) views[k] = flipped(views[k], flip.u, flip.v);
+    const Calibration result = testing::sample_calibration(views);
+    ASSERT_EQ(result.status, CalibrateReport::Status::converged);
+    const bool is_tie = flip.every == 2;
+    for (std::size_t k = 0; k < views.size() && !is_tie; ++k) {
+      EXPECT_EQ(result.views[k].used, k % flip.every != 0) << k;
+      if (k % flip.every == 0) EXPECT_THAT(result.views[k].reason, ::testing::HasSubstr(flip.words));
+    }
+    EXPECT_EQ(result.verdict.state, State::care);
+    EXPECT_THAT(result.verdict.sentence, ::testing::HasSubstr("against the others"));
+    EXPECT_EQ(result.verdict.to_add, "take all photos as the camera stored them");
+    for (const Eigen::Index at : {2, 3}) {  // cx, cy
+      const double error = params(result.camera.lens)[at] - params(camera.lens)[at];
+      if (!is_tie) EXPECT_LT(std::abs(error), 4.0 * std::sqrt(result.camera.cov(at, at)));
+    }
+  }
+}
+
+/// Corners without σ are kept as they are.
+TEST(FlippedPhotos, ThatAreKeptAreNamed) {
+  constexpr std::uint64_t seed = 5;
+  const BoardScene scene = testing::covered_scene(camera_off_centre(), 20, seed);
+  std::vector<BoardView> views = testing::sample_views(scene, seed, false);
+  for (std::size_t k = 0; k < views.size(); k += 3) views[k] = flipped(views[k], true, true);
+  const Calibration result = testing::sample_calibration(views, {.outliers = OutlierRule::keep});
+  EXPECT_EQ(result.verdict.state, State::bad);
+  EXPECT_EQ(result.verdict.exit_code, ExitCode::not_trusted);
+  EXPECT_THAT(result.verdict.sentence, ::testing::HasSubstr("7 of 20 photos"));
+  EXPECT_THAT(result.verdict.sentence, ::testing::HasSubstr("rotated by 180° against the others"));
+}
+
+/// A centre that differs in each photo is no orientation.
+TEST(FlippedPhotos, AreNotSeenInACentreThatMoves) {
+  constexpr std::uint64_t seed = 6;
+  const BoardScene scene = testing::covered_scene(testing::sample_camera("brown"), 20, seed);
+  std::vector<BoardView> views = testing::sample_views(scene, seed);
+  for (std::size_t k = 0; k < views.size(); ++k)
+    for (Corner& corner : views[k].corners) corner.px.x() += 8.0 * (static_cast<double>(7 * k % 20) / 9.5 - 1.0);
+  const Calibration result = testing::sample_calibration(views);
+  for (const ViewFit& view : result.views) EXPECT_TRUE(view.used) << view.reason;
+}
+
 /// Corners that are wrong for another reason are no flipped image's.
 TEST(FlippedPhotos, AreNotSeenInCornersOfAnotherBoard) {
   constexpr std::uint64_t seed = 3;

@@ -100,7 +100,8 @@ std::optional<TwoLenses> find_two_lenses(std::span<const ViewScore> scores, cons
 /// Whether the verdict has a cause already, of which photos disagree as well.
 bool has_a_cause(const Calibration& result) {
   if (!result.study.print_error.empty() || !result.study.lens_error.empty()) return true;
-  constexpr std::array<std::string_view, 4> causes{"mirrored", "board flat", "principal point", "one lens"};
+  constexpr std::array<std::string_view, 5> causes{"mirrored", "board flat", "principal point", "one lens",
+                                                   "given values"};
   return std::ranges::any_of(result.verdict.checks, [&](const Check& check) {
     return check.state != State::good && std::ranges::find(causes, check.name) != causes.end();
   });
@@ -194,10 +195,11 @@ ModelErrors settle_model(Calibration& result) {
 }
 
 /// With all causes that are found: those of which photos disagree as well go first.
-void give_verdict(const std::optional<Check>& flips, LensChangeStudy change, const std::vector<ViewScore>& scores,
-                  const OrderTaken& taken, Calibration& result) {
+void give_verdict(const std::optional<Check>& flips, const std::optional<GivenValues>& given, LensChangeStudy change,
+                  const std::vector<ViewScore>& scores, const OrderTaken& taken, Calibration& result) {
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
   heed_flipped_photos(result, result.verdict);
+  if (given) heed_given_values(*given, result.verdict);
   heed_changes(std::move(change), flips, scores, taken, result);
   if (const auto rival = rival_model(result.board, result.board_views, result.config, result))
     heed_rival_model(*rival, result.verdict);
@@ -225,13 +227,16 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   const std::optional<Check> flips = kept_flips(board, result.config, result.board_views, result);
   const std::vector<ShapeTransfer> transfers = settle_shape(result, progress);
   const ModelErrors errors = settle_model(result);
+  const auto given = test_given_values(board, result.board_views, result.config, result);
+  if (given) result.camera.cov += given->cov;
   name_flipped_photos(board, result.board_views, result);
   result.counts = count_photos(result);
   const std::vector<ViewScore> scores = view_scores(board, result.config, result.board_views, result);
   result.assumed = count_assumptions(board, result.config, result.board_views, scores, air, result);
   if (auto row = not_tested(errors.unseen, result)) result.assumed.push_back(std::move(*row));
   const OrderTaken taken = order_taken(result);
-  const LensChangeStudy change = find_change(scores, taken, result);
+  LensChangeStudy change = find_change(scores, taken, result);
+  if (given && given->contradict) change.change.reset();  // photos that are fitted to a wrong value differ
   if (change.change) count_change(*change.change, result);
   result.study = study_calibration(board, result.board_views, result.config, result,
                                    max_informative(transfers, result.config.board_shape), progress);
@@ -239,7 +244,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.study.lens_remedy = errors.is_of_lens ? errors.remedy : "";
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
-  give_verdict(flips, change, scores, taken, result);
+  give_verdict(flips, given, change, scores, taken, result);
   return result;
 }
 

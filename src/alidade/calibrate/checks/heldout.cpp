@@ -1,7 +1,9 @@
 #include "alidade/calibrate/checks/heldout.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 
 #include "alidade/calibrate/solve/bundle.h"
 #include "alidade/calibrate/solve/start.h"
@@ -43,6 +45,13 @@ std::vector<Candidate> candidates(const CalibrateConfig& config, std::size_t& in
   all.insert(all.begin(), {config.model + " (as asked)", config.model, config.fixed});
   in_use = 0;
   return all;
+}
+
+/// Whether what is known of a parameter holds in that model, too: else a model would be preferred for its prior.
+bool stands_in(const Candidate& other, const CalibrateConfig& config, const Prior& prior) {
+  constexpr std::array<std::string_view, 4> central{"fx", "fy", "cx", "cy"};
+  if (std::ranges::find(central, prior.name) != central.end()) return true;
+  return other.model == config.model && std::ranges::find(other.fixed, prior.name) == other.fixed.end();
 }
 
 bool is_richer(const Candidate& a, const Candidate& than) {
@@ -123,7 +132,7 @@ std::vector<HeldOutModel> heldout_models(const Board& board, std::span<const Boa
     CalibrateConfig other = config;
     other.model = all[i].model;
     other.fixed = all[i].fixed;
-    other.priors = i == in_use ? config.priors : std::vector<Prior>{};
+    if (i != in_use) std::erase_if(other.priors, [&](const Prior& prior) { return !stands_in(all[i], config, prior); });
     errors.push_back(heldout_errors(board, views, size, other, board_points));
   }
   std::vector<HeldOutModel> rows;

@@ -146,6 +146,15 @@ Check image_check(const Camera& camera, const std::vector<ProjectedReading>& pro
   return check;
 }
 
+/// Nearer than the beam enters the image nothing is wrong with it. `nearest_m`: of the readings.
+std::string remedy_of_image(const Beam& beam, const Camera& camera, double nearest_m) {
+  const std::string otherwise = "check origin, direction and camera of the beam";
+  for (double range_m = nearest_m; range_m < 100.0; range_m *= 1.02)
+    if (const auto seen = measured_pixel(beam, camera, range_m); seen && is_in_image(camera, seen->px))
+      return range_m > nearest_m ? fmt::format("the beam is in the image from {:.2g} m on", range_m) : otherwise;
+  return otherwise;
+}
+
 /// The same for the heads of a rig.
 Check image_check(const Rig& rig, const std::vector<HeadProjection>& heads) {
   Check check{.name = "in the image", .text = "each head has the point in its image"};
@@ -335,11 +344,11 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
   add_camera_assumptions(camera, result.readings, result.assumed);
   heed(units_check(beam, ranges_m, config.sigma_range_m), "give lengths in metres: 2310 mm are --range 2.31",
        result.verdict);
-  heed(image_check(camera, result.readings), "check origin, direction and camera of the beam", result.verdict);
+  heed_other_camera(config, camera, result.verdict);
+  heed(image_check(camera, result.readings), remedy_of_image(beam, camera, std::ranges::min(ranges_m)), result.verdict);
   heed(linear_check(beam, camera, result.readings), "use a beam that is better known, or a larger range",
        result.verdict);
   heed_assumptions(result.assumed, result.verdict);
-  heed_other_camera(config, camera, result.verdict);
   if (is_other_lens)
     heed({.name = "covariance",
           .state = State::care,

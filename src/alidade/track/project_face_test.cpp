@@ -49,6 +49,14 @@ TEST(ProjectFace, AnotherCameraThanTheBeamsIsSaid) {
   const BeamProjection result =
       project_readings(beside_the_lens(), camera, {1.0}, {.own_camera = other, .own_camera_name = "own.yaml"});
   EXPECT_EQ(result.verdict.state, State::care);
+  EXPECT_EQ(result.verdict.to_add, "use own.yaml");
+  // Where it is of another size, the point is outside the image for that alone.
+  Camera small = camera;
+  small.lens = with_params(camera.lens, params(camera.lens) * 0.1);
+  small.width_px = small.height_px = 32;
+  const BeamProjection outside =
+      project_readings(beside_the_lens(), small, {0.2}, {.own_camera = camera, .own_camera_name = "own.yaml"});
+  EXPECT_EQ(outside.verdict.to_add, "use own.yaml") << outside.verdict.sentence;
 }
 
 /// 1280×960, f 600 px: 94° wide.
@@ -70,6 +78,17 @@ std::string named_by(const Beam& beam, const std::vector<double>& ranges_m) {
     if (check.state != State::good) names += (names.empty() ? "" : ", ") + check.name;
   EXPECT_EQ(names.empty(), result.verdict.state == State::good);
   return names;
+}
+
+/// A reading nearer than the camera sees the beam is no fault of its origin or direction.
+TEST(ProjectFace, NearReadingsOutsideTheImageAreToldFromWhereTheBeamIsSeen) {
+  const BeamProjection near = project_readings(beside_the_lens(), wide_camera(), {0.02, 0.03});
+  EXPECT_NE(near.verdict.sentence.find("outside the image"), std::string::npos) << near.verdict.sentence;
+  EXPECT_NE(near.verdict.to_add.find("in the image from 0.0"), std::string::npos) << near.verdict.to_add;
+  Beam aside = beside_the_lens();
+  aside.direction_in_cam = {0.97, 0.0, std::sqrt(1.0 - 0.97 * 0.97)};
+  const BeamProjection far = project_readings(aside, wide_camera(), {2.0});
+  EXPECT_NE(far.verdict.to_add.find("check origin"), std::string::npos) << far.verdict.to_add;
 }
 
 TEST(ProjectFace, WhatIsNotSeenOrOfAnotherUnitIsNamed) {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -49,6 +50,11 @@ TEST_F(EdgesCommand, FindsTheDirectionAndSaysWhatItIsWorth) {
   const nlohmann::json document = nlohmann::json::parse(read_file(path("out/result.json")));
   EXPECT_EQ(document["verdict"]["state"], "care");  // a check, not a calibration
   EXPECT_EQ(document["estimate"]["method"], "edges");
+  // The covariance is in the document as it is in the beam's file: 7 parameters, its diagonal the σ.
+  ASSERT_EQ(document["covariance"]["names"].size(), 7u);
+  ASSERT_EQ(document["covariance"]["upper"].size(), 28u);
+  EXPECT_NEAR(std::sqrt(document["covariance"]["upper"][0].get<double>()),
+              document["stddev"]["origin_m"][0].get<double>(), 1e-9);
   const Beam found = read_beam(path("out/rangefinder.yaml")).beam;
   EXPECT_LT((found.direction_in_cam - truth_.direction_in_cam).norm(), 0.0084);  // as edges_test.cpp says
   const Outcome from_there = align({"--photo", path("photo.png"), "--start", path("out/rangefinder.yaml")});

@@ -200,6 +200,12 @@ void put_beam(const Beam& beam, JsonValue& estimate) {
   estimate["theta_y_rad"] = theta.y();
 }
 
+void put_covariance(const std::vector<std::string>& names, const Eigen::MatrixXd& cov, ResultDocument& document) {
+  document.covariance_names = names;
+  for (Eigen::Index i = 0; i < cov.rows(); ++i)
+    for (Eigen::Index j = i; j < cov.cols(); ++j) document.covariance_upper.push_back(cov(i, j));
+}
+
 void fill_beam(const RangefinderCalibration& report, ResultDocument& document) {
   const Beam& beam = report.beam;
   JsonValue& estimate = document.estimate;
@@ -217,9 +223,7 @@ void fill_beam(const RangefinderCalibration& report, ResultDocument& document) {
   estimate["bound"]["origin_m"] = root_of_diagonal(bound, 0, 3);
   estimate["bound"]["direction"] = root_of_diagonal(bound, 3, 3);
   estimate["bound"]["scale"] = std::sqrt(bound(6, 6));
-  document.covariance_names = report.parameter_names;
-  for (Eigen::Index i = 0; i < 7; ++i)
-    for (Eigen::Index j = i; j < 7; ++j) document.covariance_upper.push_back(report.covariance(i, j));
+  put_covariance(report.parameter_names, report.covariance, document);
 }
 
 /// What the next shots are planned with: of a sheet that was told, what the shots leave open.
@@ -356,6 +360,8 @@ JobOutcome outcome_of(const EdgesCalibration& calibration) {
   const Eigen::Matrix<double, 7, 7> cov = calibration.covariance;
   document.stddev["origin_m"] = root_of_diagonal(cov, 0, 3);
   document.stddev["direction"] = root_of_diagonal(cov, 3, 3);
+  if (is_estimate(static_cast<int>(calibration.verdict.exit_code)))
+    put_covariance(calibration.parameter_names, calibration.covariance, document);
   estimate["gain"] = calibration.gain;
   estimate["halves_differ_rad"] = calibration.halves_differ_rad;
   if (is_estimate(static_cast<int>(calibration.verdict.exit_code))) {

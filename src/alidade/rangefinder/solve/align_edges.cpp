@@ -310,7 +310,8 @@ Verdict edges_verdict(const EdgesReport& report) {
   if (report.num_edges < min_edges) {
     refuse("too few edges in the scan", "scan finer, and a scene with things at different distances");
   } else if (!(report.gain > min_gain)) {
-    refuse("the edges of the scan are not those of the photo", "check the head's angles and the camera file");
+    refuse("the edges of the scan are not those of the photo",
+           "check the head's angles and the camera file, or take a scene whose walls have no print or texture");
   } else if (!(report.halves_differ_rad < max_rad)) {
     refuse("the two halves of the scan's edges give different directions", "scan finer");
   } else {

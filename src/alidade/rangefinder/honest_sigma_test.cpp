@@ -247,7 +247,7 @@ TEST(Causes, ScaleIsSeenThoughSigmaIsEstimatedFromTheSameResiduals) {
 TEST(Causes, UnitsAndTheOrderOfRowsAreNamed) {
   const auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, 3);
   const auto cause_of = [&](const std::vector<Shot>& shots) {
-    return cause_of_misfit(shots, sample.points, sample.camera, {});
+    return cause_of_misfit(shots, sample.points, sample.camera, {}, /*is_solved=*/false);
   };
   EXPECT_EQ(cause_of({sample.simulated.shots.begin(), sample.simulated.shots.end() - 1}).find("shifted"),
             std::string::npos);
@@ -271,7 +271,7 @@ TEST(Causes, WhatFitsHasNone) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       const auto sample = draw_rangefinder_sample(*rangefinder_scenario(name), {}, seed);
       for (const SigmaMethod method : {SigmaMethod::spot, SigmaMethod::plane, SigmaMethod::joint})
-        EXPECT_EQ(cause_of_misfit(sample.simulated.shots, sample.points, sample.camera, {.method = method}), "")
+        EXPECT_EQ(cause_of_misfit(sample.simulated.shots, sample.points, sample.camera, {.method = method}, false), "")
             << name << seed;
     }
   }

@@ -34,9 +34,10 @@ namespace alidade {
 
 /// Possible reason why no beam explains the shots: with the ranges in another unit, the ranges shifted by a row against
 /// spots and boards, or spots with u and v exchanged or mirrored, a beam fits them well. One sentence; empty if none of
-/// these helps, or if a beam explains the shots as they are, even if they may not determine which beam.
+/// these helps. If the shots were solved for (`is_solved`), or a beam fits them with a scatter of some centimetres, the
+/// unit is right, and another cause is named only if a beam then fits all shots far better.
 [[nodiscard]] std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
-                                          const Camera& camera, const RangefinderConfig& config);
+                                          const Camera& camera, const RangefinderConfig& config, bool is_solved);
 
 /// The verdict on the estimate; or why there is none, what to add, and which other method could determine it.
 [[nodiscard]] Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,

@@ -156,9 +156,8 @@ SolvedRangefinder solve_rangefinder(std::span<const Shot> given, std::span<const
       name_overruled(overruled, shots, best);
     }
   // Spots alone have no left and right; where there are boards they have.
-  const bool may_be_amiss = best.verdict.exit_code != ExitCode::ok || config.method == RangefinderMethod::spot;
-  if (const std::string cause =
-          has_boards && may_be_amiss ? cause_of_misfit(given, points_in_board, best.camera, config) : "";
+  const bool stands = best.verdict.exit_code == ExitCode::ok && config.method != RangefinderMethod::spot;
+  if (const std::string cause = has_boards ? cause_of_misfit(given, points_in_board, best.camera, config, stands) : "";
       !cause.empty()) {
     refuse(cause, best);
     return best;

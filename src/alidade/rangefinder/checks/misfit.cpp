@@ -9,47 +9,72 @@
 namespace alidade {
 namespace {
 
+/// Residuals of ranges [m] and of spots [px], and how many there are.
+struct Residuals {
+  double sum_m2 = 0.0, num_m = 0.0, sum_px2 = 0.0, num_px = 0.0;
+
+  void add(const ShotFit& fit) {
+    if (std::isfinite(fit.residual_range_m)) sum_m2 += fit.residual_range_m * fit.residual_range_m, num_m += 1.0;
+    if (fit.residual_px.allFinite()) sum_px2 += fit.residual_px.squaredNorm(), num_px += 2.0;
+  }
+  [[nodiscard]] double rms_m() const { return num_m > 0.0 ? std::sqrt(sum_m2 / num_m) : infinite; }
+  [[nodiscard]] double rms_px() const { return num_px > 0.0 ? std::sqrt(2.0 * sum_px2 / num_px) : infinite; }
+  [[nodiscard]] int spare() const { return static_cast<int>(num_m + num_px) - 5; }
+
+  static constexpr double infinite = std::numeric_limits<double>::infinity();
+};
+
 /// How well a beam explains shots; 0 to spare where none does.
 struct Explained {
-  bool fits = false;                                        ///< Nearly all, by readings as a rangefinder's are.
-  bool known = false;                                       ///< And the shots determine which beam.
-  double rms_m = std::numeric_limits<double>::infinity();   ///< Of the ranges of all shots.
-  double rms_px = std::numeric_limits<double>::infinity();  ///< Of the spots of all shots.
-  int spare = 0;                                            ///< Measurements beyond what the beam takes.
+  bool fits = false;    ///< Nearly all, by readings as a rangefinder's are.
+  bool known = false;   ///< And the shots determine which beam.
+  Residuals all, used;  ///< Of all shots; without those that were rejected.
+  bool uses_all = false;
 };
 
 Explained explained(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board, const Camera& camera,
                     const RangefinderConfig& config) {
   constexpr double max_m = 0.05, max_of_range = 0.02;
   const RangefinderReport report = calibrate_rangefinder(shots, points_in_board, camera, config);
-  double mean_m = 0.0, sum_m2 = 0.0, num = 0.0, sum_px2 = 0.0, num_spots = 0.0;
+  double mean_m = 0.0;
   for (const Shot& shot : shots) mean_m += shot.range_m / static_cast<double>(shots.size());
-  Explained by{.spare = -5};
+  Explained by{.uses_all = report.shots_used == static_cast<int>(shots.size())};
   for (const ShotFit& fit : report.shots) {
-    by.spare += (std::isfinite(fit.residual_range_m) ? 1 : 0) + (fit.residual_px.allFinite() ? 2 : 0);
-    if (fit.residual_px.allFinite()) sum_px2 += fit.residual_px.squaredNorm(), num_spots += 1.0;
-    if (!std::isfinite(fit.residual_range_m)) continue;
-    sum_m2 += fit.residual_range_m * fit.residual_range_m;
-    num += 1.0;
+    by.all.add(fit);
+    if (fit.used) by.used.add(fit);
   }
-  if (num > 0.0) by.rms_m = std::sqrt(sum_m2 / num);
-  if (num_spots > 0.0) by.rms_px = std::sqrt(sum_px2 / num_spots);
   by.fits = 10 * report.shots_used >= 8 * static_cast<int>(shots.size()) && report.rms_range_m > 0.0 &&
             report.rms_range_m < std::min(max_m, max_of_range * mean_m);
   by.known = report.status == RangefinderReport::Status::converged && report.bound.sigma_origin_m < 0.1;
   return by;
 }
 
+constexpr double num_causes = 9.0;  // that are tried
+
 /// Are residuals so much smaller that by chance none of the causes tried would do so once in a thousand tables?
 /// Likelihood ratio of normal residuals, times the number of causes.
 bool is_plain(double rms_before, const Explained& by, double rms) {
-  constexpr double num_causes = 9.0, chance = 1e-3;
-  return by.fits && by.known && by.spare * std::log(rms_before / rms) > std::log(num_causes / chance);
+  constexpr double chance = 1e-3;
+  return by.fits && by.known && by.all.spare() * std::log(rms_before / rms) > std::log(num_causes / chance);
 }
 
-bool is_cause(const Explained& by, const Explained& as_given) { return is_plain(as_given.rms_m, by, by.rms_m); }
+bool is_cause(const Explained& by, const Explained& as_given) {
+  return is_plain(as_given.all.rms_m(), by, by.all.rms_m());
+}
 bool is_cause_of_spots(const Explained& by, const Explained& as_given) {
-  return is_plain(as_given.rms_px, by, by.rms_px);
+  return is_plain(as_given.all.rms_px(), by, by.all.rms_px()) || (by.uses_all && is_cause(by, as_given));
+}
+
+/// The same where a beam explains the shots as they are too, as a scatter of some centimetres: all of them, as of shots
+/// that disagree others may be rejected than before; by ranges and spots together, and not by chance once in ten
+/// thousand tables.
+bool explains_more(const Explained& by, const Explained& as_given) {
+  constexpr double chance = 1e-4;
+  if (!by.fits || !by.known || !by.uses_all || by.used.spare() < 1) return false;
+  double ln_ratio = 0.0;
+  if (by.used.num_m > 0.0) ln_ratio += by.used.num_m * std::log(as_given.used.rms_m() / by.used.rms_m());
+  if (by.used.num_px > 0.0) ln_ratio += by.used.num_px * std::log(as_given.used.rms_px() / by.used.rms_px());
+  return by.used.spare() / (by.used.num_m + by.used.num_px) * ln_ratio > std::log(num_causes / chance);
 }
 
 /// The ranges of one row after (1) or before (−1); the row without one is rejected.
@@ -63,6 +88,18 @@ std::vector<Shot> shifted(std::span<const Shot> shots, int by) {
     moved.back().sigma_range_m = shots[static_cast<std::size_t>(from)].sigma_range_m;
   }
   return moved;
+}
+
+constexpr std::array<std::pair<double, const char*>, 4> units{
+    {{0.001, "millimetres"}, {0.01, "centimetres"}, {0.0254, "inches"}, {0.3048, "feet"}}};
+
+std::vector<Shot> in_unit(std::span<const Shot> shots, double metres) {
+  std::vector<Shot> scaled(shots.begin(), shots.end());
+  for (Shot& shot : scaled) {
+    shot.range_m *= metres;
+    if (shot.sigma_range_m) *shot.sigma_range_m *= metres;
+  }
+  return scaled;
 }
 
 using ChangeOfSpot = Eigen::Vector2d (*)(const Eigen::Vector2d&, const Camera&);
@@ -91,35 +128,34 @@ constexpr std::array<std::pair<ChangeOfSpot, const char*>, 3> changes_of_spots{{
 }  // namespace
 
 std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
-                            const Camera& camera, const RangefinderConfig& config) {
+                            const Camera& camera, const RangefinderConfig& config, bool is_solved) {
   constexpr std::size_t min_shots = 7;
   if (shots.size() < min_shots) return "";
   RangefinderConfig plain = config;
   if (plain.method == RangefinderMethod::spot) plain.method = RangefinderMethod::joint;  // spots know no metres
   plain.estimate_scale = plain.scale_by_need = false;
   plain.sigma_range_m.reset();
-  const Explained as_given = explained(shots, points_in_board, camera, plain);
-  if (as_given.fits) return "";  // nothing is amiss with them: what they do not determine they do not claim
-  const auto explains = [&](std::span<const Shot> others) {
-    return is_cause(explained(others, points_in_board, camera, plain), as_given);
-  };
-  if (explains(shifted(shots, 1)))
-    return "each range belongs to the row before it: the order of the rows is shifted by one";
-  if (explains(shifted(shots, -1)))
-    return "each range belongs to the row after it: the order of the rows is shifted by one";
-  constexpr std::array<std::pair<double, const char*>, 4> units{
-      {{0.001, "millimetres"}, {0.01, "centimetres"}, {0.0254, "inches"}, {0.3048, "feet"}}};
-  for (const auto& [metres, name] : units) {
-    std::vector<Shot> scaled(shots.begin(), shots.end());
-    for (Shot& shot : scaled) {
-      shot.range_m *= metres;
-      if (shot.sigma_range_m) *shot.sigma_range_m *= metres;
-    }
-    if (explains(scaled)) return std::string("the ranges are ") + name + ", not metres";
+  plain.refine = Refine::beam;  // enough to compare beams by, and fast, as every job has it compared
+  Explained as_given = explained(shots, points_in_board, camera, plain);
+  if (!as_given.fits && config.refine != plain.refine) {
+    plain.refine = config.refine;
+    as_given = explained(shots, points_in_board, camera, plain);
   }
+  // Shots that a beam explains are in metres; rows that lag and spots that are mirrored it may explain half.
+  const auto explains = [&](std::span<const Shot> others, auto is_so) {
+    const Explained by = explained(others, points_in_board, camera, plain);
+    return is_solved || as_given.fits ? explains_more(by, as_given) : is_so(by, as_given);
+  };
+  if (explains(shifted(shots, 1), is_cause))
+    return "each range belongs to the row before it: the order of the rows is shifted by one";
+  if (explains(shifted(shots, -1), is_cause))
+    return "each range belongs to the row after it: the order of the rows is shifted by one";
+  if (!is_solved && !as_given.fits)
+    for (const auto& [metres, name] : units)
+      if (explains(in_unit(shots, metres), is_cause)) return std::string("the ranges are ") + name + ", not metres";
+  if (plain.method == RangefinderMethod::plane) return "";
   for (const auto& [change, name] : changes_of_spots)
-    if (is_cause_of_spots(explained(with_spots(shots, camera, change), points_in_board, camera, plain), as_given))
-      return name;
+    if (explains(with_spots(shots, camera, change), is_cause_of_spots)) return name;
   return "";
 }
 

@@ -92,6 +92,20 @@ bool is_larger(double found, double told, double rows) {
   return std::sqrt(2.0 * rows) * found / told - std::sqrt(std::max(0.0, 2.0 * rows - 1.0)) > sure;
 }
 
+/// σ of a reading as it was told, with its growth, in the mean square over the shots used.
+double told_sigma_m(const RangefinderReport& report, const Shots& shots, const RangeNoise& told) {
+  double sum_m2 = 0.0, num = 0.0;
+  for (std::size_t i = 0; i < report.shots.size(); ++i) {
+    const ShotFit& fit = report.shots[i];
+    if (!fit.used) continue;
+    const double cosine = fit.plane ? std::abs(fit.plane->normal_in_cam.dot(report.beam.direction_in_cam)) : 1.0;
+    const double tangent = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
+    sum_m2 += std::pow(told.sigma_at(shots.shots[i].range_m, tangent), 2);
+    num += 1.0;
+  }
+  return num > 0.0 ? std::sqrt(sum_m2 / num) : told.sigma_m;
+}
+
 /// With the σ that were told too small estimated, where that alone explains the shots. None: they were told well, or
 /// something else is wrong too. `least_ratio`: by how much, where nothing else asks for it.
 std::optional<SolvedRangefinder> with_found_sigmas(const Shots& shots, const Camera& camera,
@@ -103,10 +117,11 @@ std::optional<SolvedRangefinder> with_found_sigmas(const Shots& shots, const Cam
   const auto [of_ranges, of_spots] = spare_rows(solved.report);
   std::vector<OverruledSigma> overruled;
   open = config;
-  if (const double found = solved.report.beam.noise.sigma_m; config.sigma_range_m &&
-                                                             found > least_ratio * *config.sigma_range_m &&
-                                                             is_larger(found, *config.sigma_range_m, of_ranges)) {
-    overruled.push_back({"sigma_range_m", *config.sigma_range_m, found});
+  const double found_m = solved.report.beam.noise.sigma_m;
+  const auto told = config.range_noise();
+  const double told_m = told ? told_sigma_m(solved.report, shots, *told) : found_m;
+  if (found_m > least_ratio * told_m && is_larger(found_m, told_m, of_ranges)) {
+    overruled.push_back({"sigma_range_m", told_m, found_m});
     open.sigma_range_m = open.sigma_range_per_m = open.sigma_incidence_m = std::nullopt;
   }
   if (const double found = solved.report.sigma_spot_px; config.sigma_spot_px &&

@@ -87,5 +87,25 @@ TEST(Misfit, SpotsOfTwoLasersAreNotCalledMirrored) {
   }
 }
 
+/// A σ that was told to grow with the range was compared with its part at no range, and overruled (◆).
+TEST(Misfit, ASigmaThatGrowsAsToldStands) {
+  RangefinderSceneConfig config = *rangefinder_scenario("reference");
+  config.beam.noise = {.sigma_m = 0.002, .per_m = 0.002, .incidence_m = 0.0};
+  RangefinderConfig told, too_small;
+  told.set_range_noise(config.beam.noise);
+  too_small.set_range_noise({.sigma_m = 0.0005, .per_m = 0.0005, .incidence_m = 0.0});
+  int overruled = 0, named = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const RangefinderSample sample = draw_rangefinder_sample(config, {}, seed);
+    const auto is_named = [&](const RangefinderConfig& given) {
+      return std::ranges::count(verdict_of(sample, given).checks, "noise told", &Check::name) > 0;
+    };
+    overruled += is_named(told);
+    named += is_named(too_small);
+  }
+  EXPECT_EQ(overruled, 0);
+  EXPECT_GE(named, 19);
+}
+
 }  // namespace
 }  // namespace alidade

@@ -51,16 +51,16 @@ void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& o
   options.out = std::filesystem::path("alidade-out") / spec.name.substr(0, spec.name.find(' '));
   const std::string group = "Common options";
   app.add_option("--out", options.out, "Folder for the results")->type_name("DIR")->capture_default_str()->group(group);
-  app.add_flag("--json", options.json, "One JSON document on stdout and nothing else")->group(group);
-  app.add_flag("--quiet", options.quiet, "Nothing on stdout")->group(group);
+  app.add_flag("--json", options.json, "Print one JSON document on stdout, nothing else")->group(group);
+  app.add_flag("--quiet", options.quiet, "Print nothing on stdout")->group(group);
   app.add_flag("--no-report", options.no_report, "Write no report.html")->group(group);
-  app.add_option("--threads", options.threads, "Threads to use at most; 0: as many as there are processors")
+  app.add_option("--threads", options.threads, "Maximum number of threads; 0: one per processor")
       ->type_name("N")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str()
       ->group(group);
   if (!spec.draws_random_numbers) return;
-  app.add_option("--seed", options.seed, "Seed of the random numbers; same seed, same result")
+  app.add_option("--seed", options.seed, "Random seed; same seed, same result")
       ->type_name("N")
       ->check(CLI::Range(std::uint64_t{0}, largest_seed))
       ->capture_default_str()
@@ -153,24 +153,25 @@ App::App() : state_(std::make_unique<State>()) {
   app.require_subcommand(1);
   app.formatter(std::make_shared<HelpFormat>());
   app.footer(
-      "Begin with photos that are made for it, or with your own:\n"
+      "Start with simulated photos, or with your own:\n"
       "    alidade simulate board --board 9x6 --square 0.025 --out photos\n"
       "    alidade calibrate photos --board 9x6 --square 0.025\n"
-      "Each command has its own help, which ends with examples: alidade COMMAND --help\n"
-      "Exit codes: 0 a valid estimate, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
-      "4 the data cannot determine the answer (what is missing is named), 5 no convergence, 6 an estimate that is not "
-      "to be trusted\n"
+      "Each command has its own help with examples: alidade COMMAND --help\n"
+      "Exit codes: 0 valid estimate, 1 internal error of alidade, 2 usage error, 3 invalid input (nothing is "
+      "written),\n"
+      "4 the data do not determine the answer (what is missing is named), 5 no convergence, 6 estimate not to be "
+      "trusted\n"
       "(files are written), 130 interrupted.\n"
-      "Results replace the earlier ones in DIR at once, at the end. A run that fails leaves those as they were; a "
-      "refusal\n"
-      "(4, 5) beside an earlier estimate is written to DIR/refused.");
+      "Results replace earlier ones in DIR in one step, at the end. A failed run leaves earlier results unchanged; "
+      "where\n"
+      "they hold an estimate, a refusal (4, 5) is written to DIR/refused.");
 }
 
 App::~App() = default;
 
 void App::add_group(const std::string& name, const std::string& summary) {
   CLI::App* group = state_->app.add_subcommand(name, summary)->require_subcommand(1);
-  group->footer("Each command has its own help, which ends with examples: alidade " + name + " COMMAND --help");
+  group->footer("Each command has its own help with examples: alidade " + name + " COMMAND --help");
 }
 
 CLI::App& App::add_command(const CommandSpec& spec, std::function<ExitCode(Run&)> work) {

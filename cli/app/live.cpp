@@ -53,19 +53,19 @@ void add_live_options(CLI::App& command, LiveOptions& options, bool has_pace) {
             options.is_on = true;
             options.port = port;
           },
-          "Show the run while it runs: a page, and a server for Foxglove, on this port; 0: any (default: 8765)")
+          "Show the run live: web page and Foxglove server on this port; 0: any free port (default: 8765)")
       ->type_name("[PORT]")
       ->expected(0, 1)
       ->group(group);
   command
       .add_option("--live-address", options.address,
-                  "Listen there instead of 127.0.0.1; clients then need the token that is printed")
+                  "Listen on this address instead of 127.0.0.1; clients then need the printed token")
       ->type_name("IP")
       ->group(group);
   if (!has_pace) return;
   command
       .add_option("--live-pace", options.pace,
-                  "Times as fast as it was recorded; 1: as it was (default: as fast as it is computed)")
+                  "Playback speed relative to the recording; 1: real time (default: as fast as computed)")
       ->type_name("X")
       ->check(positive_number())
       ->group(group);

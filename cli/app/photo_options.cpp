@@ -7,7 +7,7 @@
 namespace alidade::cli {
 
 void add_photos(CLI::App& command, std::vector<std::filesystem::path>& photos, bool is_required) {
-  command.add_option("photos", photos, "Photos of the board, or folders of them (8- or 16-bit JPEG, PNG, TIFF)")
+  command.add_option("photos", photos, "Photos of the board, or folders of photos (8- or 16-bit JPEG, PNG, TIFF)")
       ->required(is_required);
 }
 

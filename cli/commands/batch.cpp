@@ -207,25 +207,28 @@ void add_batch(App& app) {
   auto args = std::make_shared<BatchArgs>();
   CLI::App& command = app.add_command(
       {.name = "batch",
-       .summary = "Many commands, one per row: one table of their results, and the outliers of the lot",
+       .summary = "Run many commands, one per row: one table of results, and the outliers among them",
        .examples =
            "  alidade batch jobs.csv --out lot\n"
            "  alidade batch jobs.csv --out lot --resume\n"
            "  mpirun -n 8 alidade batch jobs.csv --out lot && alidade batch jobs.csv --out lot --resume\n\n"
-           "jobs.csv, one row per command; other columns are options by their names:\n"
+           "jobs.csv, one row per command; other columns are options by name:\n"
            "  camera,arguments,square\n"
            "  c0001,calibrate photos/c0001 --board 9x6,0.025\n\n"
-           "Exit code: 0 where a row has an estimate, 4 where none has, whatever the others say; each row's own is in\n"
-           "batch.csv, column exit_code, and those without an estimate are named"},
+           "Exit code: 0 if any row has an estimate, 4 if none has; the exit code of each row is in batch.csv, column\n"
+           "exit_code, and rows without an estimate are named"},
       [args](Run& run) { return run_batch(*args, run); });
-  command.add_option("jobs", args->jobs, "CSV: arguments; camera, command, options by name")
+  command
+      .add_option("jobs", args->jobs,
+                  "CSV, one row per command: columns command or arguments, camera, and options by name")
       ->required()
       ->type_name("FILE.csv");
-  command.add_flag("--resume", args->resume,
-                   "Only rows that an earlier run did not do, or that say something else now");
-  command.add_option("--shard", args->shard, "Every N-th row from the I-th on, from 0; then --resume makes the table")
+  command.add_flag("--resume", args->resume, "Run only rows that are new or have changed since an earlier run");
+  command
+      .add_option("--shard", args->shard,
+                  "Run every N-th row, starting at row I (from 0); a final --resume writes the table")
       ->type_name("I/N");
-  command.add_flag("--row-reports", args->row_reports, "A report.html for each row as well");
+  command.add_flag("--row-reports", args->row_reports, "Also write a report.html for each row");
 }
 
 }  // namespace alidade::cli

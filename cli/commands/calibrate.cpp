@@ -57,15 +57,15 @@ FieldList fields_of(CalibrateArgs& args) {
        .value = &args.corners,
        .help = "Corners instead of photos: CSV photo,corner,u_px,v_px[,sigma_u_px,sigma_v_px]",
        .form = "FILE"},
-      {.name = "skip_bad", .value = &args.skip_bad, .help = "Reject rows of --corners that are wrong, by name"},
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip invalid rows of --corners, naming each"},
       {.name = "size",
        .value = pair_code(args.size.width_px, args.size.height_px, 200000, "WIDTHxHEIGHT, for example 640x480"),
-       .help = "Image size of --corners (default: what holds the corners)",
+       .help = "Image size for --corners (default: smallest that contains the corners)",
        .form = "WIDTHxHEIGHT"},
       {.name = "air",
        .value = &args.air,
-       .help = "flat_port: the lens' camera file from a calibration in air, fixed; without it the lens is estimated as "
-               "well, if the photos determine it",
+       .help = "flat_port: camera file of the lens calibrated in air, fixed; without it the lens is estimated as well, "
+               "if the photos determine it",
        .form = "FILE"}};
   fields.insert(fields.end(), inputs.begin(), inputs.end());
   for (Field& field : alidade::fields_of(args.config)) {
@@ -191,7 +191,7 @@ void add_calibrate(App& app) {
   auto args = std::make_shared<CalibrateArgs>();
   CLI::App& command = app.add_command(
       {.name = "calibrate",
-       .summary = "A camera with its distortion and covariance, from photos of a board",
+       .summary = "Intrinsics, distortion and their covariance from photos of a calibration board",
        .examples = "alidade calibrate photos/*.jpg --board 9x6 --square 0.025\n"
                    "alidade calibrate photos/ --board 9x6 --square 0.025 --board-shape free --fix k3\n"
                    "alidade calibrate photos/ --config calibrate.yaml\n"

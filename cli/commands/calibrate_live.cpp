@@ -198,22 +198,24 @@ void tell_missed_goal(const live::CaptureSession& session, double goal_px, const
 }  // namespace
 
 void add_capture_options(CLI::App& command, CaptureArgs& args) {
-  add_guide_options(command, args.live, "Take the photos now, guided", "Guided capture");
+  add_guide_options(command, args.live, "Capture the photos now, with guidance", "Guided capture");
 }
 
 FieldList fields_of(CaptureArgs& args) {
-  FieldList fields{
-      {.name = "from",
-       .value = &args.from,
-       .help = "Images of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
-               "http://…, not from the browser's camera",
-       .form = "DIR|ADDRESS"},
-      {.name = "no_page", .value = &args.no_page, .help = "With --live --from: without a page, for scripts"},
-      {.name = "wait_s",
-       .value = &args.wait_s,
-       .help = "With --no-page: ends when nothing new has come for so long [s]",
-       .limits = {0.1, 1e6}},
-      {.name = "resume", .value = &args.resume, .help = "Go on with the photos of an earlier --live", .form = "DIR"}};
+  FieldList fields{{.name = "from",
+                    .value = &args.from,
+                    .help = "Images for --live from a folder that another program writes to, or from v4l2:/dev/video0, "
+                            "rtsp://… or http://…, instead of the browser's camera",
+                    .form = "DIR|ADDRESS"},
+                   {.name = "no_page", .value = &args.no_page, .help = "With --live --from: no web page, for scripts"},
+                   {.name = "wait_s",
+                    .value = &args.wait_s,
+                    .help = "With --no-page: stop when no new image has arrived for this long [s]",
+                    .limits = {0.1, 1e6}},
+                   {.name = "resume",
+                    .value = &args.resume,
+                    .help = "Continue with the photos of an earlier --live",
+                    .form = "DIR"}};
   for (Field& field : alidade::fields_of(args.config)) {
     auto& code = std::get<TextCode>(field.value);
     code.read = [&args, read = code.read](const std::string& text) {

@@ -160,16 +160,15 @@ void add_show(App& app) {
   auto args = std::make_shared<ShowArgs>();
   CLI::App& command =
       app.add_command({.name = "camera show",
-                       .summary = "The values of a camera file, its view and its limits",
+                       .summary = "Parameters of a camera file, its field of view and valid range",
                        .examples = "  alidade camera show camera.yaml\n  alidade camera show camchain.yaml:cam1",
                        .leaves_results = false},
                       [args](Run& run) { return show(*args, run); });
   command
-      .add_option(
-          "file", args->file,
-          "Camera of alidade, OpenCV, ROS, Kalibr, mrcal or COLMAP, of SceneLib, of Civera's initialize_cam.m, of "
-          "Heikkilä's toolbox or of Bouguet's (Calib_Results.m); FILE:NAME of several, FILE:fisheye of four "
-          "coefficients of cv::fisheye")
+      .add_option("file", args->file,
+                  "Camera file of alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP, SceneLib, Civera's initialize_cam.m, "
+                  "Heikkilä's toolbox or Bouguet's (Calib_Results.m); FILE:NAME selects one of several, FILE:fisheye "
+                  "reads four coefficients as cv::fisheye")
       ->required();
 }
 
@@ -177,25 +176,27 @@ void add_convert(App& app) {
   auto args = std::make_shared<ConvertArgs>();
   CLI::App& command =
       app.add_command({.name = "camera convert",
-                       .summary = "A camera file in another format",
+                       .summary = "Convert a camera file to another format",
                        .examples = "  alidade camera convert camera.yaml camera.cameramodel --to mrcal\n"
                                    "  alidade camera convert calibration.xml camera.yaml",
                        .leaves_results = false},
                       [args](Run& run) { return convert(*args, run); });
-  command.add_option("source", args->source, "Camera file, recognised by its content; FILE:NAME of several")
+  command
+      .add_option("source", args->source, "Camera file, format recognised by content; FILE:NAME selects one of several")
       ->required();
-  command.add_option("destination", args->destination, "File to write, exactly this one")->required();
+  command.add_option("destination", args->destination, "File to write, at exactly this path")->required();
   command.add_option("--to", args->format, "Format to write")
       ->check(CLI::IsMember({"alidade", "opencv", "ros", "kalibr", "mrcal", "colmap"}))
       ->capture_default_str();
-  command.add_flag("--lossy", args->lossy, "Write the nearest lens even if the format cannot hold all of it");
+  command.add_flag("--lossy", args->lossy,
+                   "Write the nearest lens model if the format cannot represent this one exactly");
 }
 
 }  // namespace
 
 /// `alidade camera show|convert|diff|undistort`
 void add_camera(App& app) {
-  app.add_group("camera", "Camera files: show, convert, diff, undistort photos");
+  app.add_group("camera", "Show, convert and compare camera files; undistort photos");
   add_show(app);
   add_convert(app);
   add_camera_diff(app);

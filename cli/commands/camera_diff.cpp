@@ -133,15 +133,16 @@ void add_camera_diff(App& app) {
   auto args = std::make_shared<DiffArgs>();
   CLI::App& command = app.add_command(
       {.name = "camera diff",
-       .summary = "How far apart two cameras are over the image, after the motion that fits best",
+       .summary = "Difference of two cameras over the image, after the best-fitting motion",
        .examples =
            "  alidade camera diff monday.yaml friday.yaml\n  alidade camera diff a.yaml b.cameramodel --distance 2"},
       [args](Run& run) { return compare(*args, run); });
   command.add_option("a", args->a, "Camera file")->required();
   command.add_option("b", args->b, "Camera file")->required();
   command
-      .add_option("--distance", args->distance_m,
-                  "Where the cameras look [m]: takes out a rotation and a shift; not given: infinity, a rotation")
+      .add_option(
+          "--distance", args->distance_m,
+          "Distance of the scene [m]: a rotation and a translation are removed; default: infinity, a rotation only")
       ->check(positive_number());
 }
 

@@ -120,13 +120,13 @@ void add_camera_undistort(App& app) {
   auto args = std::make_shared<UndistortArgs>();
   CLI::App& command =
       app.add_command({.name = "camera undistort",
-                       .summary = "Photos as a pinhole camera would have taken them, PNG files in DIR",
+                       .summary = "Undistort photos to a pinhole camera; PNG files in DIR",
                        .examples = "  alidade camera undistort camera.yaml photos/*.jpg --out straight\n"
                                    "  alidade camera undistort fisheye.yaml wide.jpg --zoom 0.5"},
                       [args](Run& run) { return undistort(*args, run); });
   command.add_option("camera", args->camera, "Camera file")->required();
-  command.add_option("photos", args->photos, "Photos of that camera")->required();
-  command.add_option("--zoom", args->zoom, "Focal length of the result in units of the camera's; below 1 shows more")
+  command.add_option("photos", args->photos, "Photos taken with that camera")->required();
+  command.add_option("--zoom", args->zoom, "Focal length of the result relative to the camera's; below 1 shows more")
       ->check(positive_number())
       ->capture_default_str();
 }

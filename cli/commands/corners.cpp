@@ -26,7 +26,7 @@ FieldList fields_of(CornersArgs& args) {
   for (Field& field : alidade::fields_of(args.config)) {
     if (field.name == "model" || field.name == "outliers") fields.push_back(std::move(field));
   }
-  fields.push_back({.name = "csv", .value = &args.csv, .help = "Print corners.csv on stdout, and nothing else"});
+  fields.push_back({.name = "csv", .value = &args.csv, .help = "Print corners.csv on stdout, nothing else"});
   return fields;
 }
 
@@ -50,7 +50,7 @@ void add_corners(App& app) {
   auto args = std::make_shared<CornersArgs>();
   CLI::App& command = app.add_command(
       {.name = "corners",
-       .summary = "The corners of a board in photos, each with its full covariance",
+       .summary = "Detect board corners in photos, each with its full covariance",
        .examples = "alidade corners photos/ --board 9x6 --square 0.025 --out corners\n"
                    "alidade corners photos/*.jpg --board 9x6 --square 0.025 --csv > corners.csv\n"
                    "alidade calibrate --corners corners/corners.csv --size 640x480 --board 9x6 --square 0.025\n",

@@ -55,11 +55,11 @@ void add_guide_options(CLI::App& command, LiveOptions& live, const std::string& 
             live.is_on = true;
             live.port = port;
           },
-          help + ": a page with the camera's image on this port; 0: any (default: 8765)")
+          help + "; web page with the live image on this port; 0: any free port (default: 8765)")
       ->type_name("[PORT]")
       ->expected(0, 1)
       ->group(group);
-  command.add_option("--live-address", live.address, "Listen there instead of 127.0.0.1")
+  command.add_option("--live-address", live.address, "Listen on this address instead of 127.0.0.1")
       ->type_name("IP")
       ->group(group);
 }

@@ -26,14 +26,14 @@ ExitCode plan_calibrate(const PlanArgs& args, Run& run) {
 }  // namespace
 
 void add_plan(App& app) {
-  app.add_group("plan", "What to measure next");
+  app.add_group("plan", "Plan the next measurements");
   auto args = std::make_shared<PlanArgs>();
   CLI::App& command = app.add_command({.name = "plan calibrate",
-                                       .summary = "The board poses whose photos lower the uncertainty most",
+                                       .summary = "Board poses whose photos reduce the uncertainty most",
                                        .examples = "alidade plan calibrate alidade-out/calibrate --photos 3\n",
                                        .writes_at_end = true},
                                       [args](Run& run) { return plan_calibrate(*args, run); });
-  command.add_option("result", args->result, "Folder or result.json of a calibration")->required();
+  command.add_option("result", args->result, "Result folder or result.json of calibrate")->required();
   app.add_fields(command, fields_of(args->config));
   add_plan_observe(app);
   add_plan_rangefinder(app);

@@ -64,7 +64,7 @@ ExitCode reproduce_paper(const ReproduceArgs& args, Run& run) {
 void add_reproduce(App& app) {
   auto args = std::make_shared<ReproduceArgs>();
   std::vector<std::string> names;
-  std::string help = "Which:";
+  std::string help = "Paper:";
   for (const Paper& paper : reproduce::papers()) {
     names.emplace_back(paper.name);
     help += fmt::format(" {} ({});", paper.name, paper.summary);
@@ -72,13 +72,12 @@ void add_reproduce(App& app) {
   help.pop_back();
   CLI::App& command = app.add_command(
       {.name = "reproduce",
-       .summary =
-           "The experiments of a paper, run again: what it prints, what comes out, and what our methods make of it",
+       .summary = "Rerun the experiments of a paper and compare its figures with ours and with our methods",
        .examples = "  alidade reproduce fang2011 --quick\n  alidade reproduce wang2020 --out wang --seed 7",
        .draws_random_numbers = true},
       [args](Run& run) { return reproduce_paper(*args, run); });
   command.add_option("paper", args->paper, help)->required()->check(CLI::IsMember(names));
-  command.add_flag("--quick", args->quick, "Fewer draws: half a minute instead of minutes");
+  command.add_flag("--quick", args->quick, "Fewer random draws: half a minute instead of several minutes");
 }
 
 }  // namespace alidade::cli

@@ -29,11 +29,11 @@ void add_schema(App& app) {
   auto words = std::make_shared<std::vector<std::string>>();
   CLI::App& command =
       app.add_command({.name = "schema",
-                       .summary = "The JSON schema of the result.json that a command leaves",
+                       .summary = "JSON schema of the result.json that a command writes",
                        .examples = "alidade schema calibrate\nalidade schema plan observe > plan-observe.schema.json\n",
                        .leaves_results = false},
                       [words](Run& run) { return print_schema(*words, run); });
-  command.add_option("command", *words, "The command's name, as: plan observe")->required();
+  command.add_option("command", *words, "Command name, for example: plan observe")->required();
 }
 
 }  // namespace alidade::cli

@@ -153,17 +153,18 @@ ExitCode view(const ViewArgs& args, Run& run) {
 void add_view(App& app) {
   auto args = std::make_shared<ViewArgs>();
   CLI::App& command = app.add_command({.name = "view",
-                                       .summary = "The reports of finished runs, shown by a browser again",
+                                       .summary = "Show the reports of finished runs in a browser",
                                        .examples = "  alidade view alidade-out/track\n"
                                                    "  alidade view alidade-out           # a list of all in it\n"
                                                    "  alidade view monday tuesday --port 9000\n",
                                        .leaves_results = false},
                                       [args](Run& run) { return view(*args, run); });
-  command.add_option("folders", args->folders, "Folders with a result.json, or with such folders in them")->required();
-  command.add_option("--port", args->where.port, "Port; 0: any that is free (default: 8765)")->type_name("PORT");
+  command.add_option("folders", args->folders, "Folders with a result.json, or folders that contain such folders")
+      ->required();
+  command.add_option("--port", args->where.port, "Port; 0: any free port (default: 8765)")->type_name("PORT");
   command
       .add_option("--address", args->where.address,
-                  "Listen there instead of 127.0.0.1; clients then need the token that is printed")
+                  "Listen on this address instead of 127.0.0.1; clients then need the printed token")
       ->type_name("IP");
 }
 

@@ -60,15 +60,15 @@ FieldList port_fields(PortKnowledge& port) {
   constexpr Limits length{0.0, 10.0}, index{1.0, 4.0};
   return {{.name = "gap_m",
            .value = &port.gap_m,
-           .help = "flat_port: air between lens and glass, an initial guess [m]",
+           .help = "flat_port: air gap between lens and glass, initial guess [m]",
            .limits = length},
           {.name = "glass_m",
            .value = &port.glass_m,
-           .help = "flat_port: thickness of the port, fixed [m]; must be given",
+           .help = "flat_port: thickness of the glass, fixed [m]; required",
            .limits = length},
           {.name = "n_glass",
            .value = &port.n_glass,
-           .help = "flat_port: refractive index of the port, fixed",
+           .help = "flat_port: refractive index of the glass, fixed",
            .limits = index},
           {.name = "n_water",
            .value = &port.n_water,
@@ -93,20 +93,20 @@ FieldList fields_of(CalibrateConfig& config) {
       {.name = "model", .value = words_code(config.model, models()), .help = "Lens model"},
       {.name = "fixed",
        .value = &config.fixed,
-       .help = "Parameters fixed at zero (cx, cy: the image's centre; with --prior: its value), for example k3,p1,p2",
+       .help =
+           "Parameters fixed at zero (cx, cy: at the image centre; with --prior: at its value), for example k3,p1,p2",
        .option = "--fix"},
-      {.name = "free", .value = &config.free, .help = "Parameters estimated that are fixed otherwise: skew"},
+      {.name = "free", .value = &config.free, .help = "Parameters to estimate that are otherwise fixed: skew"},
       {.name = "prior",
        .value = priors_code(config.priors),
-       .help = "What is known of a parameter, NAME=VALUE:SIGMA, as fx=650:5",
+       .help = "Prior on a parameter, NAME=VALUE:SIGMA, for example fx=650:5",
        .form = "NAME=VALUE:SIGMA,..."},
       {.name = "board_shape",
        .value = words_code(config.board_shape, shape_words()),
-       .help = "flat, bow (2 parameters), free (every point), auto (bow or free if the photos prove it)"},
+       .help = "flat, bow (2 parameters), free (every point), auto (bow or free if the photos show it)"},
       {.name = "outliers",
        .value = words_code(config.outliers, rules),
-       .help = "drop: reject corners that no noise explains, by name; keep; auto: drop, but keep corners given without "
-               "sigma"}};
+       .help = "drop: reject outlier corners, naming each; keep; auto: drop, but keep corners given without sigma"}};
   const FieldList port = port_fields(config.port);
   fields.insert(fields.end(), port.begin(), port.end());
   return fields;

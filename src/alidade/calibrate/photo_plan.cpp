@@ -40,7 +40,7 @@ Verdict photos_verdict(const PhotoPlan& plan) {
 }  // namespace
 
 FieldList fields_of(PhotoConfig& config) {
-  return {{.name = "photos", .value = &config.photos, .help = "How many photos to propose", .limits = {1, 20}}};
+  return {{.name = "photos", .value = &config.photos, .help = "Number of photos to propose", .limits = {1, 20}}};
 }
 
 PhotoPlan plan_photos(const CalibratedNow& now, const PhotoConfig& config, const Progress& progress) {

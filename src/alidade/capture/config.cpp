@@ -18,7 +18,7 @@ FieldList fields_of(CaptureConfig& config) {
   code.write = [&config] { return fmt::format("{}px", config.until_px); };
   return {{.name = "until_px",
            .value = code,
-           .help = "Goal of --live: 3σ at the worst pixel; there it ends",
+           .help = "Goal of --live: 3σ at the worst pixel; capture stops when it is reached",
            .form = "PIXELS",
            .option = "--until"}};
 }

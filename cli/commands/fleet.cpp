@@ -44,12 +44,12 @@ void add_broker_options(CLI::App& command, FleetBroker& broker) {
       ->type_name("URL")
       ->capture_default_str()
       ->group(group);
-  command.add_option("--creds", broker.credentials, "Credentials of a user (JWT and seed)")
+  command.add_option("--creds", broker.credentials, "User credentials (JWT and seed)")->type_name("FILE")->group(group);
+  command.add_option("--tls-ca", broker.ca, "CA certificates to verify the server; enables TLS")
       ->type_name("FILE")
       ->group(group);
-  command.add_option("--tls-ca", broker.ca, "CA certificates of the server: TLS")->type_name("FILE")->group(group);
-  CLI::Option* cert = command.add_option("--tls-cert", broker.certificate, "Own certificate")->type_name("FILE");
-  CLI::Option* key = command.add_option("--tls-key", broker.key, "Its key")->type_name("FILE");
+  CLI::Option* cert = command.add_option("--tls-cert", broker.certificate, "Client certificate")->type_name("FILE");
+  CLI::Option* key = command.add_option("--tls-key", broker.key, "Key of the client certificate")->type_name("FILE");
   cert->needs(key)->group(group);
   key->needs(cert)->group(group);
 }
@@ -236,32 +236,38 @@ void add_worker(App& app) {
   auto args = std::make_shared<WorkerArgs>();
   CLI::App& command = app.add_command(
       {.name = "fleet worker",
-       .summary = "Takes observations of installed cameras as they come, keeps what each is, and says what moves",
+       .summary =
+           "Process observations of installed cameras as they arrive, keep the state of each, and report what moves",
        .examples = "  nats-server -a 127.0.0.1 -js -sd store &\n"
                    "  alidade fleet worker --nats nats://127.0.0.1:4222 --size 640x480\n"
                    "  alidade fleet worker --from fleet/rows.txt --size 640x480 --out states",
        .leaves_results = false},
       [args](Run& run) { return fleet_worker(*args, run); });
-  command.add_option("--size", args->size, "Size of the images")->required()->type_name("WxH");
-  command.add_option("--threshold", args->options.config.threshold, "Of the cumulative sums, in σ; see docs/scale.md")
+  command.add_option("--size", args->size, "Image size")->required()->type_name("WxH");
+  command
+      .add_option("--threshold", args->options.config.threshold,
+                  "Alarm threshold of the cumulative sums (CUSUM), in σ; see docs/scale.md")
       ->check(CLI::Range(3.0, 100.0))
       ->capture_default_str();
-  command.add_option("--from", args->from, "Rows of a file instead, lines 'CAMERA ROW'; states.jsonl, alarms.jsonl")
+  command
+      .add_option("--from", args->from,
+                  "Read rows from a file instead, lines 'CAMERA ROW'; writes states.jsonl, alarms.jsonl")
       ->type_name("FILE");
   add_broker_options(command, args->options.broker);
 }
 
 void add_watch(App& app) {
   auto args = std::make_shared<FleetWatchOptions>();
-  CLI::App& command = app.add_command({.name = "fleet watch",
-                                       .summary = "The fleet in a browser: verdicts, the worst first, history of one",
-                                       .examples = "  alidade fleet watch --nats nats://127.0.0.1:4222",
-                                       .leaves_results = false},
-                                      [args](Run& run) -> ExitCode {
-                                        if (!fleet_engine().watch) hand_over(run);
-                                        return fleet_engine().watch(*args, run);
-                                      });
-  command.add_option("--port", args->port, "Of the page, on this machine alone; 0: any")
+  CLI::App& command =
+      app.add_command({.name = "fleet watch",
+                       .summary = "Show the fleet in a browser: verdicts, worst first, and the history of each camera",
+                       .examples = "  alidade fleet watch --nats nats://127.0.0.1:4222",
+                       .leaves_results = false},
+                      [args](Run& run) -> ExitCode {
+                        if (!fleet_engine().watch) hand_over(run);
+                        return fleet_engine().watch(*args, run);
+                      });
+  command.add_option("--port", args->port, "Port of the web page, on localhost only; 0: any free port")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   add_broker_options(command, args->broker);
@@ -275,7 +281,7 @@ FleetEngine& fleet_engine() {
 }
 
 void add_fleet(App& app) {
-  app.add_group("fleet", "Installed cameras, each observed all the time, over a NATS broker");
+  app.add_group("fleet", "Monitor installed cameras continuously over a NATS broker");
   add_worker(app);
   add_watch(app);
 }
@@ -284,7 +290,8 @@ void add_fleet_scenario(App& app) {
   auto args = std::make_shared<FleetSimulationArgs>();
   CLI::App& command = app.add_command(
       {.name = "simulate fleet",
-       .summary = "Cameras that patrol, belts that slip, brackets that sag, focal lengths that drift, frozen images",
+       .summary = "Fleet of patrolling cameras with faults: slipping belts, sagging brackets, drifting focal lengths, "
+                  "frozen images",
        .examples =
            "  alidade simulate fleet --cameras 100 --rows 600 --out fleet\n"
            "  alidade simulate fleet --cameras 10000 --rate 1 --publish --nats nats://127.0.0.1:4222 --out fleet",
@@ -294,20 +301,27 @@ void add_fleet_scenario(App& app) {
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     command.add_option(name, value, help)->check(CLI::Range(low, high))->capture_default_str();
   };
-  command.add_option("--cameras", simulation.cameras, "How many")->check(CLI::Range(1, 99999))->capture_default_str();
-  command.add_option("--rows", simulation.rows, "Of each")->check(CLI::Range(1, 10000000))->capture_default_str();
-  command.add_option("--size", args->size, "Size of the images")->type_name("WxH")->capture_default_str();
-  number("--rate", simulation.scene.rate_hz, "Rows a second of each", 0.001, 1000.0);
-  number("--noise-px", simulation.scene.noise_px, "Noise of a pixel coordinate", 0.0, 100.0);
-  number("--events", simulation.scene.event_share, "Share of the cameras to which something happens", 0.0, 1.0);
-  number("--event-after", simulation.scene.event_after_s, "Not before, and within as long again [s]", 0.0, 1e9);
+  command.add_option("--cameras", simulation.cameras, "Number of cameras")
+      ->check(CLI::Range(1, 99999))
+      ->capture_default_str();
+  command.add_option("--rows", simulation.rows, "Rows per camera")
+      ->check(CLI::Range(1, 10000000))
+      ->capture_default_str();
+  command.add_option("--size", args->size, "Image size")->type_name("WxH")->capture_default_str();
+  number("--rate", simulation.scene.rate_hz, "Rows per second per camera", 0.001, 1000.0);
+  number("--noise-px", simulation.scene.noise_px, "σ of a pixel coordinate [px]", 0.0, 100.0);
+  number("--events", simulation.scene.event_share, "Share of the cameras that have a fault", 0.0, 1.0);
+  number("--event-after", simulation.scene.event_after_s, "Faults occur between this time and twice this time [s]", 0.0,
+         1e9);
   number("--slip-sigmas", simulation.scene.slip_sigmas,
-         "Belts slip by this many σ of a row, nothing else happens; 0: drawn", 0.0, 1000.0);
-  number("--warming", simulation.scene.warming_c,
-         "It gets so much warmer, and the focal length of that share follows it, instead of events [°C]", 0.0, 100.0);
-  number("--warming-time", simulation.scene.warming_s, "Within [s]", 1.0, 1e9);
-  command.add_flag("--publish", args->publishes, "Publish them instead of leaving rows.txt");
-  command.add_flag("--fast", args->as_fast, "Publish as fast as the broker takes them, not at their rate");
+         "The only fault is a slipping belt, by this many σ of a row; 0: random faults", 0.0, 1000.0);
+  number(
+      "--warming", simulation.scene.warming_c,
+      "Temperature rise instead of faults; the focal length of the --events share of cameras follows it [°C]; 0: none",
+      0.0, 100.0);
+  number("--warming-time", simulation.scene.warming_s, "Duration of the temperature rise [s]", 1.0, 1e9);
+  command.add_flag("--publish", args->publishes, "Publish the rows instead of writing rows.txt");
+  command.add_flag("--fast", args->as_fast, "Publish as fast as the broker accepts, instead of at --rate");
   add_broker_options(command, simulation.broker);
 }
 

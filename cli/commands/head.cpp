@@ -81,7 +81,7 @@ Field follow_field(NamedLook& look) {
   Field field = look_field(look);
   field.name = "follow";
   field.option = "--follow";
-  field.help = "Follow a target, by its appearance: " + field.help.substr(field.help.find("colour:"));
+  field.help = "Follow a target with this appearance: " + field.help.substr(field.help.find("colour:"));
   field.group.clear();
   field.old_options.clear();
   return field;
@@ -90,35 +90,35 @@ Field follow_field(NamedLook& look) {
 /// What is done with the head, and from what.
 FieldList job_fields(HeadArgs& args) {
   return {
-      {.name = "move", .value = &args.move, .help = "Allow the head to move; without it nothing moves"},
+      {.name = "move", .value = &args.move, .help = "Allow the head to move; without this option nothing moves"},
       {.name = "identify",
        .value = &args.identify,
-       .help = "Identify its model: rate, acceleration, time constant, latency, backlash, dead band, repeatability"},
+       .help = "Identify its dynamics: rate, acceleration, time constant, latency, backlash, dead band, repeatability"},
       {.name = "calibrate",
        .value = &args.calibrate,
        .help = "Calibrate its camera by planned moves: lens, mounting, delay"},
       {.name = "stream",
        .value = &args.stream,
-       .help =
-           "Video of its camera: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (it says "
-           "where), indi://HOST:PORT/CAMERA, or sim:// of a simulated head",
+       .help = "Video of its camera: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (asked "
+               "for its stream address), indi://HOST:PORT/CAMERA, or sim:// for a simulated head",
        .form = "URL"},
       {.name = "until",
        .value = share_code(args.until),
-       .help = "Stop when 3 sigma of fx and fy are this share of them; exit code 4 if that is not reached (default: "
-               "its usual time)",
+       .help = "Stop when 3σ of fx and of fy is below this percentage of the value; exit code 4 if not reached "
+               "(default: run for the usual time)",
        .form = "SHARE%"},
       {.name = "most_s",
        .value = &args.max_s,
-       .help = "Longest time that --calibrate or --follow may take [s]",
+       .help = "Maximum duration of --calibrate or --follow [s]",
        .limits = {5.0, 86400.0}},
       {.name = "resume",
        .value = &args.resume,
-       .help = "For --calibrate: use the measurements of an earlier, perhaps interrupted, run in DIR as well",
+       .help = "For --calibrate: also use the measurements of an earlier, possibly interrupted, run in DIR",
        .form = "DIR"},
       {.name = "password_file",
        .value = &args.password_file,
-       .help = "Its first line is the password of the user in the addresses (default: ALIDADE_PASSWORD)",
+       .help = "File whose first line is the password of the user in the URLs (default: environment variable "
+               "ALIDADE_PASSWORD)",
        .form = "FILE"},
   };
 }
@@ -126,18 +126,18 @@ FieldList job_fields(HeadArgs& args) {
 FieldList follow_fields(HeadArgs& args) {
   return {
       follow_field(args.look),
-      {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml of --calibrate", .form = "FILE"},
+      {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml written by --calibrate", .form = "FILE"},
       {.name = "identified",
        .value = &args.identified,
-       .help = "For --follow: the folder of --identify, whose rate, time constant, latency and resolution are used",
+       .help = "For --follow: result folder of --identify; its rate, time constant, latency and resolution are used",
        .form = "DIR"},
       {.name = "latency_s",
        .value = &args.latency_s,
-       .help = "For --follow without --identified: from a command to its first effect [s] (default: 0.05)",
+       .help = "For --follow without --identified: latency from a command to its first effect [s] (default: 0.05)",
        .limits = {0.0, 2.0}},
       {.name = "delay_s",
        .value = &args.follow.delay_s,
-       .help = "For --follow: delay of the angles after a frame's time, as --calibrate estimates it [s]",
+       .help = "For --follow: delay of the angles relative to a frame's time, as estimated by --calibrate [s]",
        .limits = {-2.0, 2.0}},
   };
 }
@@ -372,8 +372,7 @@ void add_head(App& app) {
   auto args = std::make_shared<HeadArgs>();
   CLI::App& command = app.add_command(
       {.name = "head",
-       .summary =
-           "A connected pan-tilt head: what it is, how it follows its commands, its camera, and following a target",
+       .summary = "Query, identify and calibrate a connected pan-tilt head and its camera, or follow a target with it",
        .examples =
            "alidade head rotctl://127.0.0.1:4533\n"
            "alidade head rotctl://127.0.0.1:4533 --identify --move --pan-range -60,60 --tilt-range 0,60\n"

@@ -20,7 +20,7 @@ struct IdentifyArgs {
 FieldList fields_of(IdentifyArgs& args) {
   FieldList fields = alidade::fields_of(args.config);
   fields.push_back(
-      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip rows that are wrong, by name, instead of stopping"});
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip invalid rows, naming each, instead of stopping"});
   return fields;
 }
 
@@ -39,20 +39,18 @@ ExitCode run_identify(const IdentifyArgs& args, Run& run) {
 
 void add_identify(App& app) {
   auto args = std::make_shared<IdentifyArgs>();
-  CLI::App& command = app.add_command(
-      {.name = "identify",
-       .summary =
-           "Gain, time constant, latency, limits, dead band and backlash of one axis of a pan-tilt head from a log of "
-           "commands and angles",
-       .examples = "  alidade identify log.csv\n"
-                   "  alidade simulate servo --chirp --out sim && alidade identify sim/log.csv\n",
-       .writes_at_end = true},
-      [args](Run& run) { return run_identify(*args, run); });
+  CLI::App& command =
+      app.add_command({.name = "identify",
+                       .summary = "Gain, time constant, latency, limits, dead band and backlash of one pan-tilt axis, "
+                                  "from a log of commands and angles",
+                       .examples = "  alidade identify log.csv\n"
+                                   "  alidade simulate servo --chirp --out sim && alidade identify sim/log.csv\n",
+                       .writes_at_end = true},
+                      [args](Run& run) { return run_identify(*args, run); });
   command
-      .add_option(
-          "log", args->log,
-          "CSV: t_s,command,angle_rad (or angle_deg): the command from that time on, or from command_t_s on where "
-          "that is a column, the angle read at it")
+      .add_option("log", args->log,
+                  "CSV: t_s,command,angle_rad (or angle_deg): the angle read at t_s, and the command in force from t_s "
+                  "on (from command_t_s, if that column exists)")
       ->required();
   app.add_fields(command, fields_of(*args));
 }

@@ -57,7 +57,7 @@ FieldList fields_of(Imu& imu) {
        .limits = positive},
       {.name = "accelerometer_noise",
        .value = &noise.force_density,
-       .help = "Noise density of its accelerometer [m/s²/√Hz]",
+       .help = "Noise density of the accelerometer of --imu [m/s²/√Hz]",
        .limits = positive},
       {.name = "gyro_walk",
        .value = &noise.rate_walk,
@@ -69,15 +69,15 @@ FieldList fields_of(Imu& imu) {
        .limits = positive},
       {.name = "sigma_accelerometer_scale",
        .value = &noise.sigma_force_scale,
-       .help = "σ of the scale factor that all its forces share (0.003: 0.3 %)",
+       .help = "Relative σ of the accelerometer's common scale factor (0.003: 0.3 %)",
        .limits = positive},
       {.name = "sigma_imu_axes",
        .value = &noise.sigma_axes,
-       .help = "σ by which the axes of either sensor differ in scale or are not perpendicular (0.01: 1 %)",
+       .help = "Relative σ of axis scale differences and misalignment in either sensor (0.01: 1 %)",
        .limits = positive},
       {.name = "gravity_m_s2",
        .value = &imu.gravity_m_s2,
-       .help = "Size of gravity, to 0.02 m/s²",
+       .help = "Magnitude of gravity, known to 0.02 m/s²",
        .limits = {9.7, 9.9},
        .option = "--gravity"},
   };
@@ -88,31 +88,29 @@ FieldList frame_fields(LocalizeArgs& args) {
   return {
       {.name = "camera",
        .value = &args.camera,
-       .help = "The camera, calibrated in the water it is used in",
+       .help = "Camera file, calibrated in the medium it is used in (air or water)",
        .form = "FILE",
        .is_required = true},
       {.name = "target",
        .value = &args.target,
-       .help = "What gives scale and the map's frame (target.yaml): known points; in images a rectangle, a board, or "
-               "points with patches",
+       .help = "Known target that fixes scale and map frame (target.yaml): known points, or, in images, a rectangle, a "
+               "board or points with patches",
        .form = "FILE",
        .old_options = {"--landmarks"}},
       {.name = "map",
        .value = &args.map,
-       .help =
-           "A map that an earlier run has left (map.yaml), instead of a target: the path begins where it is found, in "
-           "its frame and scale; of images by how its points look, of tables by their numbers",
+       .help = "Map saved by an earlier run (map.yaml), used instead of a target: the path starts once the map is "
+               "recognised, in its frame and scale; matched by appearance in images, by point number in tables",
        .form = "FILE"},
       {.name = "start",
        .value = &args.start,
-       .help = "Initial pose and velocity of the camera, σ; depths of points (start.yaml)",
+       .help = "Initial pose and velocity of the camera with σ, and point depths (start.yaml)",
        .form = "FILE"},
       {.name = "mask",
        .value = &args.mask,
-       .help =
-           "Where images show the scene: an image of the camera's size, black where they do not; 'circle', as an "
-           "endoscope's, found in the first image that shows one; or 'auto': without what never moves while the scene "
-           "does, as a clock that is burnt in",
+       .help = "Mask image of the camera's size, black where the scene is not visible; 'circle': "
+               "circular view, as of an endoscope, found in the first image that shows one; 'auto': excludes what "
+               "stays still while the scene moves, such as a burnt-in clock",
        .form = "FILE|circle|auto"},
   };
 }
@@ -122,36 +120,35 @@ FieldList sensor_fields(LocalizeArgs& args) {
   return {
       {.name = "depth_sensor",
        .value = &args.depth_sensor,
-       .help = "How deep the camera is, up to an offset, CSV: t_s,depth_m[,sigma_m]; metres without a target, else a "
-               "check of its scale",
+       .help = "Depth of the camera, up to an offset, CSV: t_s,depth_m[,sigma_m]; gives metric scale without a target, "
+               "else checks its scale",
        .form = "FILE"},
       {.name = "range",
        .value = &args.range,
        .help =
-           "Readings of a rangefinder beside the camera, CSV: t_s,range_m; metres without a target, else a check of "
-           "its scale; needs --beam",
+           "Readings of a rangefinder beside the camera, CSV: t_s,range_m; give metric scale without a target, else "
+           "check its scale; needs --beam",
        .form = "FILE"},
       {.name = "beam",
        .value = &args.beam,
-       .help = "Its beam in the camera's frame (rangefinder.yaml, as alidade rangefinder writes it)",
+       .help = "Beam of the rangefinder in the camera frame (rangefinder.yaml, as written by alidade rangefinder)",
        .form = "FILE"},
       {.name = "odometry",
        .value = &args.odometry,
-       .help =
-           "Where a vehicle's odometry says that it is, CSV: t_s,x_m,y_m[,z_m], in a frame of its own: metres by the "
-           "lengths of its ways without a target, else a check of its scale",
+       .help = "Positions by vehicle odometry, CSV: t_s,x_m,y_m[,z_m], in its own frame: lengths travelled give metric "
+               "scale without a target, else check its scale",
        .form = "FILE"},
       {.name = "imu",
        .value = &args.imu,
-       .help =
-           "Readings of an inertial measurement unit fixed to the camera, CSV: t_s,omega_x_rad_s,omega_y_rad_s,"
-           "omega_z_rad_s,force_x_m_s2,force_y_m_s2,force_z_m_s2 (at rest +9.81 upwards), or EuRoC's imu0/data.csv, in "
-           "its own axes: metres and the direction of gravity without a target, else a check of its scale",
+       .help = "Readings of an IMU fixed to the camera, CSV: "
+               "t_s,omega_x_rad_s,omega_y_rad_s,omega_z_rad_s,force_x_m_s2,force_y_m_s2,force_z_m_s2 (at rest +9.81 "
+               "upwards), or EuRoC's imu0/data.csv, in its own axes: give metric scale and gravity direction without a "
+               "target, else check its scale",
        .form = "FILE"},
       {.name = "imu_mounting",
        .value = &args.imu_mounting,
-       .help = "Its mounting, cam_from_imu: translation_m and quaternion_wxyz, or Kalibr's T_cam_imu "
-               "(default: its rotation is found by the motion, its position within 0.1 m)",
+       .help = "Mounting of the IMU, cam_from_imu: translation_m and quaternion_wxyz, or Kalibr's T_cam_imu (default: "
+               "rotation estimated from the motion, position within 0.1 m of the camera)",
        .form = "FILE"},
   };
 }
@@ -163,22 +160,22 @@ FieldList fields_of(LocalizeArgs& args) {
   append({
       {.name = "truth",
        .value = &args.truth,
-       .help = "True path as TUM (t x y z qx qy qz qw); adds ATE and RPE",
+       .help = "True trajectory in TUM format (t x y z qx qy qz qw); adds ATE and RPE",
        .form = "FILE"},
       {.name = "rate_hz",
        .value = &args.rate_hz,
-       .help = "Frames per second: times are frame numbers over this (default: the video's own times)",
+       .help = "Frame rate [Hz]: time = frame number / rate (default: timestamps of the video)",
        .limits = {.min = 0.0, .is_above_min = true}},
   });
   append({{.name = "wait_s",
            .value = &args.wait_s,
-           .help = "Images of a folder that another program still writes: so many seconds without a new one end it; "
-                   "poses are printed as they come",
+           .help = "For a folder that another program is still writing to: stop when no new image has arrived for this "
+                   "long [s]; poses are printed as they come",
            .limits = {.min = 0.0, .is_above_min = true}}});
   append(alidade::fields_of(args.config));
   append(fields_of(args.imu_values));
   fields.push_back(
-      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip rows that are wrong, by name, instead of stopping"});
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip invalid rows, naming each, instead of stopping"});
   return fields;
 }
 
@@ -348,7 +345,8 @@ void add_localize(App& app) {
   auto args = std::make_shared<LocalizeArgs>();
   CLI::App& command = app.add_command(
       {.name = "localize",
-       .summary = "Path of a moving camera, and the map of the points it sees, with the lens in the filter",
+       .summary = "Trajectory of a moving camera and a map of the points it sees (visual SLAM), with the lens model in "
+                  "the filter",
        .examples = "alidade localize frames/ --camera camera.yaml --target rectangle.yaml --rate 30 --sigma-a 4 "
                    "--sigma-alpha 6\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
@@ -363,12 +361,11 @@ void add_localize(App& app) {
        .writes_at_end = true},
       [args](Run& run) { return run_localize(*args, run); });
   command
-      .add_option(
-          "sequence", args->sequence,
-          "Images: a folder of numbered ones, EuRoC's layout (mav0/cam0), or a video; or observations of "
-          "numbered points, CSV: frame,t_s,point_id,u_px,v_px, in order of time; - reads these rows from standard "
-          "input and answers each frame by its filter; --imu, --depth-sensor, --range and --odometry count in the path "
-          "that is solved at the end")
+      .add_option("sequence", args->sequence,
+                  "Images: folder of numbered frames, EuRoC layout (mav0/cam0) or video; or observations of numbered "
+                  "points, CSV: frame,t_s,point_id,u_px,v_px, in time order; -: read these rows from standard input "
+                  "and print the filter's pose of each frame; --imu, --depth-sensor, --range and --odometry then only "
+                  "count in the path solved at the end")
       ->required();
   app.add_fields(command, fields_of(*args));
   add_live_options(command, args->live);

@@ -37,24 +37,25 @@ FieldList fields_of(ObserveArgs& args) {
   FieldList fields = {
       {.name = "pairs",
        .value = &args.pairs,
-       .help = "Points matched between photos instead, of which many may be wrong, CSV: frame_a,frame_b,ua_px,…",
+       .help = "Point matches between photos instead, many of which may be wrong, CSV: frame_a,frame_b,ua_px,…",
        .form = "FILE"},
       {.name = "video",
        .value = &args.video,
-       .help = "Video file or folder of numbered frames instead: points are followed in it",
+       .help = "Video file or folder of numbered frames instead; points are tracked in it",
        .form = "FILE|DIR"},
       {.name = "angles",
        .value = &args.angles,
-       .help = "Rotation of the camera in the video, CSV: t, the rotation",
+       .help = "Rotation of the camera during the video, CSV: t, rotation columns",
        .form = "FILE"},
       {.name = "rate_hz",
        .value = &args.rate_hz,
-       .help = "Frames per second, first at t = 0 (default: the angles have a row per frame)",
+       .help = "Frame rate [Hz], first frame at t = 0 (default: --angles has one row per frame)",
        .limits = {.min = 0.0, .is_above_min = true}},
-      {.name = "camera", .value = &args.camera, .help = "Initial guess, and the lens' distortion", .form = "FILE"},
-      {.name = "skip_bad",
-       .value = &args.skip_bad,
-       .help = "Reject rows that are wrong, by name, instead of stopping"}};
+      {.name = "camera",
+       .value = &args.camera,
+       .help = "Camera file with the initial guess and the lens distortion",
+       .form = "FILE"},
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip invalid rows, naming each, instead of stopping"}};
   for (Field& field : alidade::fields_of(args.config)) fields.push_back(std::move(field));
   return fields;
 }
@@ -181,7 +182,7 @@ void add_observe(App& app) {
   auto args = std::make_shared<ObserveArgs>();
   CLI::App& command = app.add_command(
       {.name = "observe",
-       .summary = "Intrinsics of a camera that pans, tilts and zooms, from what it sees while it rotates",
+       .summary = "Intrinsics of a rotating (pan-tilt-zoom) camera from what it sees while it rotates",
        .examples = "alidade observe log.csv --size 780x582\n"
                    "alidade observe log.csv --camera prior.yaml --estimate k1,mount,delay\n"
                    "alidade observe --video ptz.mp4 --angles encoder.csv --rate 30\n"
@@ -190,10 +191,9 @@ void add_observe(App& app) {
                    "alidade observe --pairs matches.csv --rotation free --square-pixels --fix-centre --size 1280x960\n",
        .writes_at_end = true},
       [args](Run& run) { return run_observe(*args, run); });
-  command.add_option(
-      "log", args->inputs,
-      "Rotation log, CSV: t, the rotation, p1x,p1y,p2x,p2y,…; - reads rows from standard input and answers each. Or "
-      "photos, or folders of them, of a camera that was rotated on the spot");
+  command.add_option("log", args->inputs,
+                     "Rotation log, CSV: t, rotation columns, p1x,p1y,p2x,p2y,…; -: read rows from standard input and "
+                     "answer each; or photos, or folders of photos, of a camera rotated on the spot");
   app.add_fields(command, fields_of(*args));
   add_live_options(command, args->live, false);
 }

@@ -27,11 +27,11 @@ void add_plan_observe(App& app) {
   auto args = std::make_shared<PlanObserveArgs>();
   CLI::App& command =
       app.add_command({.name = "plan observe",
-                       .summary = "The rotations of the head that lower the uncertainty most",
+                       .summary = "Rotations of the head that reduce the uncertainty most",
                        .examples = "alidade plan observe alidade-out/observe --moves 3 --rate-deg-s 15\n",
                        .writes_at_end = true},
                       [args](Run& run) { return plan_observe(*args, run); });
-  command.add_option("result", args->result, "Folder or result.json of an observation")->required();
+  command.add_option("result", args->result, "Result folder or result.json of observe")->required();
   app.add_fields(command, fields_of(args->config));
 }
 

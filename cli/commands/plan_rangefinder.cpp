@@ -26,11 +26,11 @@ void add_plan_rangefinder(App& app) {
   auto args = std::make_shared<PlanRangefinderArgs>();
   CLI::App& command =
       app.add_command({.name = "plan rangefinder",
-                       .summary = "Where to hold the board for the shots that lower the uncertainty most",
+                       .summary = "Where to hold the board for the shots that reduce the uncertainty most",
                        .examples = "alidade plan rangefinder alidade-out/rangefinder --shots 3\n",
                        .writes_at_end = true},
                       [args](Run& run) { return plan_rangefinder(*args, run); });
-  command.add_option("result", args->result, "Folder or result.json of a calibrated rangefinder")->required();
+  command.add_option("result", args->result, "Result folder or result.json of rangefinder")->required();
   app.add_fields(command, fields_of(args->config));
 }
 

@@ -87,24 +87,29 @@ void add_project(App& app) {
   auto args = std::make_shared<ProjectArgs>();
   CLI::App& command = app.add_command(
       {.name = "project",
-       .summary = "Pixel and 3-D point of a rangefinder's reading, or matrices and pixels of a pan-tilt rig",
+       .summary = "Pixel and 3-D point of a rangefinder reading, or projection matrices and pixels of a pan-tilt rig",
        .examples = "alidade project --beam rangefinder.yaml --camera camera.yaml --range 2.31\n"
                    "alidade project --beam rangefinder.yaml --range 0.5,1,2,4 --overlay photo.jpg\n"
                    "alidade project --rig rig.yaml --pan 0.1,-0.2 --tilt 0.2 --point 0.1 -0.3 2.5\n"},
       [args](Run& run) { return run_project(*args, run); });
-  command.add_option("--beam", args->beam, "rangefinder.yaml of alidade rangefinder")->type_name("FILE");
-  command.add_option("--camera", args->camera, "The camera (default: the one that the beam names)")->type_name("FILE");
-  command.add_option("--range", args->ranges_m, "Reading, or several [m]")->delimiter(',')->check(positive_number());
-  command.add_option("--overlay", args->overlay, "Draw the beam's line and the spots into this photo: overlay.png")
+  command.add_option("--beam", args->beam, "Beam, rangefinder.yaml as written by alidade rangefinder")
+      ->type_name("FILE");
+  command.add_option("--camera", args->camera, "Camera file (default: the one named in the beam file)")
+      ->type_name("FILE");
+  command.add_option("--range", args->ranges_m, "Range reading, or several [m]")
+      ->delimiter(',')
+      ->check(positive_number());
+  command.add_option("--overlay", args->overlay, "Draw the beam and the spots into this photo; writes overlay.png")
       ->type_name("PHOTO");
-  command.add_option("--rig", args->rig, "rig.yaml of alidade rig")->type_name("FILE");
-  command.add_option("--pan", args->pans_rad, "What the pan encoders read, one for all or one for each head [rad]")
+  command.add_option("--rig", args->rig, "Rig, rig.yaml as written by alidade rig")->type_name("FILE");
+  command.add_option("--pan", args->pans_rad, "Pan encoder readings, one for all heads or one per head [rad]")
       ->delimiter(',')
       ->check(finite_number());
-  command.add_option("--tilt", args->tilts_rad, "What the tilt encoders read [rad]")
+  command.add_option("--tilt", args->tilts_rad, "Tilt encoder readings, likewise [rad]")
       ->delimiter(',')
       ->check(finite_number());
-  command.add_option("--point", args->point_m, "X Y Z in the rig's world [m]: gives its pixels")
+  command
+      .add_option("--point", args->point_m, "Point X Y Z in the rig's world frame [m]; prints its pixel in each camera")
       ->expected(3)
       ->check(finite_number());
   app.add_fields(command, fields_of(args->config));

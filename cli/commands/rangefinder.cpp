@@ -44,34 +44,30 @@ TextCode method_code(RangefinderArgs& args) {
 }
 
 FieldList fields_of(RangefinderArgs& args) {
-  FieldList fields = {{.name = "camera",
-                       .value = &args.camera,
-                       .help = "The camera that saw them",
-                       .form = "FILE",
-                       .is_required = true}};
+  FieldList fields = {
+      {.name = "camera", .value = &args.camera, .help = "Camera file", .form = "FILE", .is_required = true}};
   for (Field& field : alidade::fields_of(args.config)) {
     if (field.name == "method") {
       field.value = method_code(args);
-      field.help += "; edges: direction alone, from a scan of the head (CSV pan,tilt,range_m) and --photo";
+      field.help += "; edges: direction only, from a scan with the head (CSV pan,tilt,range_m) and --photo";
     }
     fields.push_back(std::move(field));
   }
   for (Field& field : alidade::fields_of(args.board, /*is_required=*/false)) fields.push_back(std::move(field));
-  const FieldList inputs = {{.name = "corners",
-                             .value = &args.corners,
-                             .help = "Corners instead of photos: CSV photo,corner,u_px,v_px,…",
-                             .form = "FILE"},
-                            {.name = "photo",
-                             .value = &args.photo,
-                             .help = "With --method edges: the photo, taken with the head at zero",
-                             .form = "PHOTO"},
-                            {.name = "start",
-                             .value = &args.initial_guess,
-                             .help = "With --method edges: a rangefinder.yaml near it (default: along the view)",
-                             .form = "FILE"},
-                            {.name = "skip_bad",
-                             .value = &args.skip_bad,
-                             .help = "Reject rows that are wrong, by name, instead of stopping"}};
+  const FieldList inputs = {
+      {.name = "corners",
+       .value = &args.corners,
+       .help = "Corners instead of photos: CSV photo,corner,u_px,v_px,…",
+       .form = "FILE"},
+      {.name = "photo",
+       .value = &args.photo,
+       .help = "With --method edges: photo taken with the head at zero",
+       .form = "PHOTO"},
+      {.name = "start",
+       .value = &args.initial_guess,
+       .help = "With --method edges: initial guess, a rangefinder.yaml (default: along the optical axis)",
+       .form = "FILE"},
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip invalid rows, naming each, instead of stopping"}};
   fields.insert(fields.end(), inputs.begin(), inputs.end());
   for (Field& field : fields_of(args.guided)) fields.push_back(std::move(field));
   return fields;
@@ -175,7 +171,7 @@ void add_rangefinder(App& app) {
   auto args = std::make_shared<RangefinderArgs>();
   CLI::App& command = app.add_command(
       {.name = "rangefinder",
-       .summary = "Origin and direction of a laser rangefinder's beam in a camera",
+       .summary = "Origin and direction of a laser rangefinder's beam in the camera frame",
        .examples = "alidade rangefinder shots.csv --camera camera.yaml --board 9x6 --square 0.04\n"
                    "alidade rangefinder shots.csv --camera camera.yaml --method spot --spot red\n"
                    "alidade rangefinder shots.csv --camera camera.yaml --method plane --scale --sigma-range-m 0.01\n"
@@ -183,8 +179,8 @@ void add_rangefinder(App& app) {
        .writes_at_end = true},
       [args](Run& run) { return run_rangefinder(*args, run); });
   command.add_option("shots", args->shots,
-                     "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane, "
-                     "nx x + ny y + nz z + d = 0); none with --live");
+                     "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane, nx x "
+                     "+ ny y + nz z + d = 0); omit with --live");
   add_guided_shots_options(command, args->guided);
   app.add_fields(command, fields_of(*args));
 }

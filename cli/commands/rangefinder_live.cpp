@@ -125,7 +125,8 @@ class ShotsWork : public GuidedWork {
 }  // namespace
 
 void add_guided_shots_options(CLI::App& command, GuidedShotsArgs& args) {
-  add_guide_options(command, args.live, "Take the shots now, guided: hold the board as outlined, enter each reading",
+  add_guide_options(command, args.live,
+                    "Take the shots now, with guidance: hold the board as outlined and enter each reading",
                     "Guided shots");
 }
 
@@ -133,15 +134,15 @@ FieldList fields_of(GuidedShotsArgs& args) {
   FieldList fields{
       {.name = "from",
        .value = &args.from,
-       .help = "Images of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
-               "http://…, not from the browser's camera",
+       .help = "Images for --live from a folder that another program writes to, or from v4l2:/dev/video0, rtsp://… or "
+               "http://…, instead of the browser's camera",
        .form = "DIR|ADDRESS"},
       {.name = "until_mm",
        .value = &args.until_mm,
-       .help = "Goal of --live: 3σ of the beam's origin [mm]; there it ends (0: you end it)",
+       .help = "Goal of --live: 3σ of the beam's origin [mm]; capture stops when it is reached (0: stop by hand)",
        .limits = {0.0, 1e4},
        .option = "--until-mm"},
-      {.name = "resume", .value = &args.resume, .help = "Go on with the shots of an earlier --live", .form = "DIR"}};
+      {.name = "resume", .value = &args.resume, .help = "Continue with the shots of an earlier --live", .form = "DIR"}};
   for (Field& field : alidade::fields_of(args.where)) {
     if (field.name == "shots") continue;
     field.help += ", in guided shots";

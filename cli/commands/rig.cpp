@@ -32,24 +32,21 @@ struct RigArgs {
 FieldList fields_of(RigArgs& args) {
   FieldList fields = alidade::fields_of(args.board, /*is_required=*/false);
   for (Field& field : alidade::fields_of(args.config)) fields.push_back(std::move(field));
-  fields.push_back({.name = "skip_bad",
-                    .value = &args.skip_bad,
-                    .help = "Reject rows that are wrong, by name, instead of stopping"});
+  fields.push_back(
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip invalid rows, naming each, instead of stopping"});
   const std::string group = "Cameras that do not rotate";
   fields.push_back({.name = "moving_target",
                     .value = &args.by_moving_target,
-                    .help =
-                        "The table has observations of one target that moves, t_capture_s,head,u_px,v_px, by cameras "
-                        "that do not rotate: their positions, attitudes and clocks; no board",
+                    .help = "The table has observations of one moving target, t_capture_s,head,u_px,v_px, by cameras "
+                            "that do not rotate: estimates their positions, attitudes and clocks; no board",
                     .group = group});
   for (Field& field : alidade::fields_of(args.moving))
     if (field.name != "sigma_px") fields.push_back(std::move(field));  // the rig's own
-  fields.push_back(
-      {.name = "truth",
-       .value = &args.truth,
-       .help = "The target's path by other means (GNSS), CSV: t_s,x_m,y_m,z_m: gives scale, frame and clock",
-       .form = "FILE",
-       .group = group});
+  fields.push_back({.name = "truth",
+                    .value = &args.truth,
+                    .help = "Reference path of the target (GNSS), CSV: t_s,x_m,y_m,z_m; fixes scale, frame and clock",
+                    .form = "FILE",
+                    .group = group});
   return fields;
 }
 
@@ -117,11 +114,11 @@ void add_rig(App& app) {
   command
       .add_option("views", args->views,
                   "Table of views, CSV: view,board,head,pan_rad,tilt_rad with corner,u,v (one row per corner) or photo "
-                  "(one row per view); `board` numbers the positions where the board stood")
+                  "(one row per view); `board` numbers the positions of the board")
       ->required();
   command
       .add_option("--camera", args->cameras,
-                  "The camera of all heads, or one for each head in the order of their numbers")
+                  "Camera file, one for all heads or one per head in the order of their numbers")
       ->type_name("FILE")
       ->required()
       ->expected(1)

@@ -92,36 +92,37 @@ void add_servo(App& app) {
   CLI::App& command = app.add_command(
       {.name = "servo",
        .summary =
-           "The closed loop of a moving target, two pan-tilt heads and their controllers, compared by pixel error",
+           "Simulate closed-loop tracking of a moving target by two pan-tilt heads; compare controllers by pixel error",
        .examples = "  alidade servo scenario.yaml\n"
                    "  alidade servo scenario.yaml --controller mpc --latency-ms 100 --seeds 20\n\n"
-                   "scenario.yaml; every key may be omitted, these are the values it then has:\n\n" +
+                   "scenario.yaml; every key is optional, with these defaults:\n\n" +
                    servo_scenario_text(),
        .draws_random_numbers = true,
        .writes_at_end = true},
       [args](Run& run) { return run_servo_command(*args, run); });
   command.add_option("scenario", args->scenario, "YAML: target, heads, plant, delays, noise, controllers; see below")
       ->required();
-  command.add_option("--controller", args->controllers, "Only these of pi, feedforward, lqr, mpc")
+  command.add_option("--controller", args->controllers, "Run only these controllers: pi, feedforward, lqr, mpc")
       ->check(CLI::IsMember({"pi", "feedforward", "lqr", "mpc"}))
       ->delimiter(',');
-  command.add_option("--seeds", args->seeds, "Runs of each controller, from --seed on")->check(CLI::Range(1, 1000));
-  command.add_option("--latency-ms", args->latency_ms, "From an image to its pixel")
+  command.add_option("--seeds", args->seeds, "Runs per controller, with seeds from --seed on")
+      ->check(CLI::Range(1, 1000));
+  command.add_option("--latency-ms", args->latency_ms, "Delay from capture of an image to its pixel")
       ->check(number_within(0.0, 10000.0));
-  command.add_option("--true-gain", args->gain_factor, "The plant's true gain over the known one")
+  command.add_option("--true-gain", args->gain_factor, "True gain of the plant / gain known to the controllers")
       ->check(number_within(0.01, 100.0));
-  command.add_option("--true-tau", args->tau_factor, "The plant's true time constant over the known one")
+  command
+      .add_option("--true-tau", args->tau_factor, "True time constant of the plant / the one known to the controllers")
       ->check(number_within(0.01, 100.0));
   command
       .add_option("--intrinsics", args->intrinsics,
-                  "Intrinsics that the loop uses where lenses zoom: given (the rig's), observed (estimated on-line "
-                  "from static points in the images), true")
+                  "Intrinsics used by the loop when lenses zoom: given (the rig's), observed (estimated online from "
+                  "static points in the images), true")
       ->check(CLI::IsMember({"given", "observed", "true"}));
-  command.add_flag("--no-robustness", args->no_robustness, "Skip the grid over gain and time constant");
-  command.add_flag(
-      "--realtime", args->real_time,
-      "Hold the first run of each controller to the wall clock, and report how late its steps were (default: "
-      "as fast as it can)");
+  command.add_flag("--no-robustness", args->no_robustness, "Skip the robustness grid over gain and time constant");
+  command.add_flag("--realtime", args->real_time,
+                   "Run the first run of each controller in real time and report how late its steps were (default: as "
+                   "fast as possible)");
   add_live_options(command, args->live);
 }
 

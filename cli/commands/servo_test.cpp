@@ -97,7 +97,7 @@ TEST_F(ServoCommand, RmsIsThatOfItsRows) {
 
 TEST_F(ServoCommand, TheHelpsScenarioIsThePreset) {
   const Outcome help = alidade({"servo", "--help"});
-  const std::size_t begin = help.out.find("# What alidade servo runs");
+  const std::size_t begin = help.out.find("# Scenario of alidade servo");
   ASSERT_NE(begin, std::string::npos);
   const auto rms_of = [](const Outcome& outcome) {
     return Json::parse(outcome.out)["estimate"]["controllers"]["mpc"]["rms_px"].get<double>();

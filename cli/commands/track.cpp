@@ -39,20 +39,27 @@ struct TrackArgs {
 
 FieldList fields_of(TrackArgs& args) {
   FieldList fields = {
-      {.name = "angles", .value = &args.angles, .help = "With --video: t_s,head,pan_rad,tilt_rad, CSV", .form = "FILE"},
+      {.name = "angles",
+       .value = &args.angles,
+       .help = "With --video: angles of the heads, CSV: t_s,head,pan_rad,tilt_rad",
+       .form = "FILE"},
       look_field(args.look),
       {.name = "rate_hz",
        .value = &args.rate_hz,
-       .help = "Frames per second of the videos; angles are interpolated (default: one row of angles per frame)",
+       .help = "Frame rate of the videos [Hz]; angles are interpolated (default: one row of angles per frame)",
        .limits = {.min = 0.0, .is_above_min = true}},
-      {.name = "rig", .value = &args.rig, .help = "The heads and their cameras", .form = "FILE", .is_required = true},
+      {.name = "rig",
+       .value = &args.rig,
+       .help = "Heads and their cameras (rig.yaml)",
+       .form = "FILE",
+       .is_required = true},
       {.name = "truth",
        .value = &args.truth,
-       .help = "True path, CSV: t_s,x_m,y_m,z_m; adds errors, NEES and the bound",
+       .help = "True path, CSV: t_s,x_m,y_m,z_m; adds errors, NEES and the Cramér–Rao bound",
        .form = "FILE"}};
   for (Field& field : alidade::fields_of(args.config)) fields.push_back(std::move(field));
   fields.push_back(
-      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip rows that are wrong, by name, instead of stopping"});
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Skip invalid rows, naming each, instead of stopping"});
   return fields;
 }
 
@@ -197,7 +204,7 @@ void add_track(App& app) {
   auto args = std::make_shared<TrackArgs>();
   CLI::App& command = app.add_command(
       {.name = "track",
-       .summary = "Path of a target in space from the pixels and angles of two or more pan-tilt heads",
+       .summary = "3-D path of a target from the pixels and angles of two or more pan-tilt heads",
        .examples = "alidade track events.csv --rig rig.yaml\n"
                    "alidade track events.csv --rig rig.yaml --method imm --predict 0.1\n"
                    "  tail -f events.csv | alidade track - --rig rig.yaml\n"
@@ -207,20 +214,19 @@ void add_track(App& app) {
                    "  --look colour:230,70,20\n",
        .writes_at_end = true},
       [args](Run& run) { return run_track(*args, run); });
-  command.add_option(
-      "events", args->events,
-      "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival; - reads "
-      "rows from standard input and answers each; where --sigma-a and --sigma-px are not given by 1 m/s2 and 0.5 px, "
-      "until its end, which estimates them");
+  command.add_option("events", args->events,
+                     "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival; -: "
+                     "read rows from standard input and answer each, until the end with 1 m/s2 and 0.5 px unless "
+                     "--sigma-a and --sigma-px are given; the final result estimates them");
   command
       .add_option("--video", args->videos,
-                  "Videos or folders of numbered frames instead, one per head of the rig, in its order")
+                  "Videos or folders of numbered frames instead, one per head, in the order of the rig")
       ->type_name("FILE");
   command
       .add_option("--intrinsics", args->intrinsics,
-                  "intrinsics.csv of `alidade observe`, one per head of the rig in its order (- for a head that does "
-                  "not zoom): each observation is taken with the lens of its time, whose σ is counted; or "
-                  "`intrinsics:` of a head in rig.yaml")
+                  "intrinsics.csv of `alidade observe`, one per head in the order of the rig (- for a head that does "
+                  "not zoom): each observation uses the lens at its time, with its σ included; or set `intrinsics:` of "
+                  "a head in rig.yaml")
       ->type_name("FILE");
   app.add_fields(command, fields_of(*args));
   add_live_options(command, args->live);

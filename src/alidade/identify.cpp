@@ -166,11 +166,11 @@ const WordList<ServoKindRule>& servo_kind_words() {
 FieldList fields_of(IdentifyConfig& config) {
   return {{.name = "kind",
            .value = words_code(config.kind, servo_kind_words()),
-           .help = "What follows the command with a lag: the angle, or its rate; auto: the one with clearly "
+           .help = "Quantity that follows the command with a lag: the angle or its rate; auto: whichever gives clearly "
                    "smaller residuals"},
           {.name = "sigma_clock",
            .value = &config.sigma_clock,
-           .help = "σ of the rate of the log's clock (0.001: 0.1 %), counted in σ; 0: exact",
+           .help = "Relative σ of the rate of the log's clock (0.001: 0.1 %), included in every σ; 0: exact",
            .limits = {.min = 0.0, .max = 0.1}}};
 }
 

@@ -301,7 +301,7 @@ Check files_check(const Rig& rig) {
 FieldList fields_of(ProjectConfig& config) {
   return {{.name = "sigma_range_m",
            .value = &config.sigma_range_m,
-           .help = "σ of the reading [m] (default: the beam's)",
+           .help = "σ of a reading [m] (default: from the beam file)",
            .limits = {0.0, max_length_m, /*is_above_min=*/true},
            .option = "--sigma-range-m"}};
 }

@@ -68,8 +68,8 @@ Field look_field(NamedLook& look) {
   return {.name = "look",
           .value = code,
           .help =
-              "What the target looks like: colour:R,G,B (0 to 255), bright, dark, pattern:FILE (an image of it "
-              "alone) or marker:DICTIONARY:ID, such as marker:DICT_4X4_50:7",
+              "Appearance of the target: colour:R,G,B (0 to 255), bright, dark, pattern:FILE (an image of the target "
+              "only) or marker:DICTIONARY:ID, for example marker:DICT_4X4_50:7",
           .form = "LOOK",
           .old_options = {"--target"}};
 }

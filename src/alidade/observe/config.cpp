@@ -32,24 +32,25 @@ FieldList word_fields(ObserveConfig& config) {
   return {
       {.name = "method",
        .value = words_code(config.method, methods),
-       .help = "hybrid: adjustment, then a filter that follows zooms; window: adjustment of the last seconds; flow: "
-               "regression on image motion; fang2011: the paper's observer; batch: one adjustment of all rows"},
+       .help = "hybrid: least-squares adjustment, then a filter that follows zooms; window: adjustment of the last "
+               "seconds; "
+               "flow: regression on image motion; fang2011: the paper's observer; batch: one adjustment of all rows"},
       {.name = "rotation",
        .value = words_code(config.rotation, rotations),
-       .help = "known: exact; noisy: measured with --sigma-angle or --sigma-rate; free"},
+       .help = "known: exact; noisy: measured with --sigma-angle or --sigma-rate; free: estimated"},
       {.name = "estimate",
        .value = &config.estimate,
-       .help =
-           "Estimated as well: auto (default: what the residuals indicate), none, or of k1, k2, k3, p1, p2, mount, "
-           "delay, lever, shutter, focal-drift, and of the rotation scale, backlash, curve, axes, drift, bias, clock"},
+       .help = "Estimate as well: auto (default: what the residuals indicate), none, or any of k1, k2, k3, p1, p2, "
+               "mount, delay, lever, shutter, focal-drift, and, for the measured rotation, scale, backlash, curve, "
+               "axes, drift, bias, clock"},
       {.name = "start",
        .value = vector_code<4>(config.start),
-       .help = "Initial guess: fx,fy,cx,cy [px]; without it several are tried",
+       .help = "Initial guess fx,fy,cx,cy [px] (default: several are tried)",
        .form = "NUMBER"},
       {.name = "size",
        .value = pair_code(config.width_px, config.height_px, 20000,
                           "WIDTHxHEIGHT of 32 to 20000 px, for example 800x600", 32),
-       .help = "Size of the images (default: the camera's, else the smallest that contains the points)",
+       .help = "Image size (default: the camera's, else the smallest that contains the points)",
        .form = "WxH"},
       {.name = "profile", .value = words_code(config.profile, profiles), .help = "Gains of --method fang2011"}};
 }
@@ -59,14 +60,15 @@ FieldList number_fields(ObserveConfig& config) {
       {.name = "square_pixels", .value = &config.square_pixels, .help = "fx = fy"},
       {.name = "no_zoom",
        .value = &config.no_zoom,
-       .help = "The camera does not zoom: what seems a zoom is something else"},
+       .help = "The camera does not zoom; apparent zoom has another cause"},
       {.name = "fixed_centre",
        .value = &config.fixed_centre,
-       .help = "cx, cy fixed: the initial guess's, or the image's centre",
+       .help = "Fix cx, cy at the initial guess, or at the image centre",
        .option = "--fix-centre"},
       {.name = "lever_m",
        .value = vector_code<3>(config.lever_m),
-       .help = "Camera centre from the centre of rotation, x,y,z in the camera frame [m]",
+       .help =
+           "Lever arm: position of the camera centre relative to the centre of rotation, x,y,z in the camera frame [m]",
        .form = "NUMBER"},
   };
 }
@@ -84,7 +86,7 @@ FieldList sigma_fields(ObserveConfig& config) {
        .limits = positive},
       {.name = "sigma_rate_rad_per_s",
        .value = &config.sigma_rate_rad_per_s,
-       .help = "σ of a rate [rad/s]",
+       .help = "σ of an angular rate [rad/s]",
        .limits = positive,
        .option = "--sigma-rate"},
       {.name = "sigma_range_m",
@@ -94,12 +96,12 @@ FieldList sigma_fields(ObserveConfig& config) {
        .option = "--sigma-range-m"},
       {.name = "sigma_scale",
        .value = &config.sigma_scale,
-       .help = "σ of the scale of the measured angles or rates, relative; 0: exact",
+       .help = "Relative σ of the scale of the measured angles or rates; 0: exact",
        .limits = relative,
        .option = "--sigma-encoder-scale"},
       {.name = "sigma_parallax",
        .value = &config.sigma_parallax,
-       .help = "σ of how far the camera centre is from the axes, over the distance of the points; 0: exact",
+       .help = "σ of the camera centre's offset from the axes, relative to the distance of the points; 0: exact",
        .limits = relative},
   };
 }
@@ -107,12 +109,12 @@ FieldList sigma_fields(ObserveConfig& config) {
 FieldList length_fields(ObserveConfig& config) {
   return {{.name = "window_s",
            .value = &config.window_s,
-           .help = "Length of --method window [s]",
+           .help = "Length of the window of --method window [s]",
            .limits = positive,
            .option = "--window-s"},
           {.name = "keep_rows",
            .value = &config.keep_rows,
-           .help = "Of rows from standard input: how many of the newest the final result covers at least; at most "
+           .help = "Rows from standard input: minimum number of latest rows that the final result covers; at most "
                    "twice as many",
            .limits = {.min = 100, .max = 1e9}}};
 }

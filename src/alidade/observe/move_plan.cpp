@@ -54,15 +54,15 @@ Verdict moves_verdict(const MovePlan& plan, const MoveLimits& limits) {
 }  // namespace
 
 FieldList fields_of(MoveConfig& config) {
-  return {{.name = "moves", .value = &config.moves, .help = "How many rotations to propose", .limits = {1, 20}},
+  return {{.name = "moves", .value = &config.moves, .help = "Number of rotations to propose", .limits = {1, 20}},
           {.name = "rate_deg_s",
            .value = &config.rate_deg_s,
-           .help = "How fast each axis rotates",
+           .help = "Rate of each axis [deg/s]",
            .limits = {.min = 0.0, .is_above_min = true},
            .option = "--rate-deg-s"},
           {.name = "max_turn_deg",
            .value = &config.max_turn_deg,
-           .help = "How far from here",
+           .help = "Maximum rotation from the current position [deg]",
            .limits = {0.1, 85.0},
            .option = "--max-turn-deg"},
           {.name = "roll", .value = &config.roll, .help = "The head can roll as well"}};

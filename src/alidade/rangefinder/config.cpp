@@ -17,7 +17,7 @@ FieldList sigma_fields(RangefinderConfig& config) {
   constexpr Limits positive{.min = 0.0, .is_above_min = true}, share{.min = 0.0, .max = 1.0};
   return {{.name = "sigma_px",
            .value = &config.sigma_spot_px,
-           .help = "σ of a spot's coordinate [px] (default: by the photo, else estimated from the residuals)",
+           .help = "σ of a spot's coordinate [px] (default: from the photo, else estimated from the residuals)",
            .limits = positive,
            .option = "--sigma-px"},
           {.name = "sigma_range_m",
@@ -27,27 +27,27 @@ FieldList sigma_fields(RangefinderConfig& config) {
            .option = "--sigma-range-m"},
           {.name = "sigma_square_m",
            .value = &config.sigma_square_m,
-           .help = "σ of the length of the board's squares [m]; 0: exact",
+           .help = "σ of the side of the board's squares [m]; 0: exact",
            .limits = share},
           {.name = "sigma_flat_m",
            .value = &config.sigma_flat_m,
-           .help = "σ of how far the surface that the beam meets lies off the plane of the board's corners, as of a "
-                   "sheet before the print [m]; 0: exact (default: nothing is counted but what the shots show of it)",
+           .help = "σ of the offset of the surface hit by the beam from the plane of the corners, for example of a "
+                   "sheet in front of the print [m]; 0: exact (default: only what the shots show)",
            .limits = share,
            .option = "--sigma-flat"},
           {.name = "sigma_scale",
            .value = &config.sigma_scale,
-           .help = "σ of the scale of the readings, which is then fixed at 1; 0: exact (default: estimated where it "
-                   "matters and the shots determine it)",
+           .help = "σ of the scale of the readings, then fixed at 1; 0: exact (default: estimated if it matters and "
+                   "the shots determine it)",
            .limits = share},
           {.name = "sigma_range_per_m",
            .value = &config.sigma_range_per_m,
-           .help = "Growth of σ of a reading per metre of range [m/m]",
+           .help = "Increase of a reading's σ per metre of range [m/m]",
            .limits = positive,
            .option = "--sigma-range-per-m"},
           {.name = "sigma_incidence_m",
            .value = &config.sigma_incidence_m,
-           .help = "σ of a reading per tan of the angle of incidence, added in quadrature [m]",
+           .help = "Contribution to a reading's σ per tan(angle of incidence), added in quadrature [m]",
            .limits = positive,
            .option = "--sigma-incidence-m"}};
 }
@@ -80,20 +80,20 @@ FieldList fields_of(RangefinderConfig& config) {
   FieldList fields = {
       {.name = "method",
        .value = words_code(config.method, rangefinder_method_words()),
-       .help = "joint: whatever each shot has; spot: no board is needed; plane: the spot need not be seen"},
+       .help = "joint: all measurements of each shot; spot: needs no board; plane: needs no visible spot"},
       {.name = "refine",
        .value = words_code(config.refine, parts),
-       .help = "all: lens (as its covariance allows), boards and beam together; beam: lens and boards fixed"},
+       .help = "all: refine lens (within its covariance), boards and beam jointly; beam: lens and boards fixed"},
       {.name = "spot",
        .value = words_code(config.spot, colours),
-       .help = "Colour of the laser: auto, red, green, or bright (in grey photos)"},
+       .help = "Colour of the laser: auto, red, green or bright (for grey photos)"},
       {.name = "scale",
        .value = &config.estimate_scale,
-       .help = "Estimate a scale of the readings as well (not with spots alone)"}};
+       .help = "Also estimate the scale of the readings (not possible with spots alone)"}};
   for (Field& field : sigma_fields(config)) fields.push_back(std::move(field));
   fields.push_back({.name = "outliers",
                     .value = outliers_code(config.reject_outliers),
-                    .help = "drop: reject shots that no noise explains, by name; keep"});
+                    .help = "drop: reject outlier shots, naming each; keep"});
   return fields;
 }
 

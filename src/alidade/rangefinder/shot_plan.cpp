@@ -88,7 +88,7 @@ void put_taken(const RangefinderReport& report, bool have_corners, BeamNow& now)
 }  // namespace
 
 FieldList fields_of(ShotConfig& config) {
-  FieldList fields{{.name = "shots", .value = &config.shots, .help = "How many shots to propose", .limits = {1, 20}}};
+  FieldList fields{{.name = "shots", .value = &config.shots, .help = "Number of shots to propose", .limits = {1, 20}}};
   for (Field& field : board_reach_fields(config.min_range_m, config.max_range_m, "max_tilt_deg", config.max_tilt_deg))
     fields.push_back(std::move(field));
   return fields;

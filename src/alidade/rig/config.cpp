@@ -54,40 +54,41 @@ TextCode freedoms_code(RigConfig& config) {
 FieldList fields_of(RigConfig& config) {
   constexpr Limits positive{.min = 0.0, .is_above_min = true};
   static const WordList<bool> rules = {{true, "drop"}, {false, "keep"}};
-  return {{.name = "sigma_px",
-           .value = &config.sigma_px,
-           .help = "σ of a corner's coordinate [px] (default: estimated from the residuals)",
-           .limits = positive,
-           .option = "--sigma-px"},
-          {.name = "sigma_angle_rad",
-           .value = &config.sigma_encoder_rad,
-           .help = "σ of an encoder's reading [rad] (default: estimated as well)",
-           .limits = positive},
-          {.name = "sigma_square_m",
-           .value = &config.sigma_square_m,
-           .help = "σ of a square's side [m], counted in the answer's σ",
-           .limits = positive},
-          {.name = "sigma_scale",
-           .value = &config.sigma_scale,
-           .help = "σ of the encoders' scales (0.001: 0.1 %), counted as well",
-           .limits = positive},
-          {.name = "sigma_within_turn_rad",
-           .value = &config.sigma_within_turn_rad,
-           .help = "σ of an encoder's error within a revolution [rad], by which its scale differs over a part of one; "
-                   "counted beside --sigma-scale; 0: none",
-           .limits = {.min = 0.0, .max = 0.1},
-           .option = "--sigma-within-turn"},
-          {.name = "estimate",
-           .value = freedoms_code(config),
-           .help = "auto: what the residuals indicate, and scales that are not given; none; or any of scale, once (an "
-                   "error of one period per revolution), backlash (views in the order they were taken), focal, centre "
-                   "(of each lens)"},
-          {.name = "scales",
-           .value = &config.estimate_scales,
-           .help = "Estimate the scale of each encoder as well (--estimate scale)"},
-          {.name = "outliers",
-           .value = words_code(config.reject_outliers, rules),
-           .help = "drop: reject views that contradict the others, by name; keep"}};
+  return {
+      {.name = "sigma_px",
+       .value = &config.sigma_px,
+       .help = "σ of a corner's coordinate [px] (default: estimated from the residuals)",
+       .limits = positive,
+       .option = "--sigma-px"},
+      {.name = "sigma_angle_rad",
+       .value = &config.sigma_encoder_rad,
+       .help = "σ of an encoder reading [rad] (default: estimated from the residuals)",
+       .limits = positive},
+      {.name = "sigma_square_m",
+       .value = &config.sigma_square_m,
+       .help = "σ of the side of a square [m], included in the result's σ",
+       .limits = positive},
+      {.name = "sigma_scale",
+       .value = &config.sigma_scale,
+       .help = "Relative σ of the encoder scales (0.001: 0.1 %), included as well",
+       .limits = positive},
+      {.name = "sigma_within_turn_rad",
+       .value = &config.sigma_within_turn_rad,
+       .help = "σ of an encoder's error within a revolution [rad], which changes its scale over part of one; included "
+               "in addition to --sigma-scale; 0: none",
+       .limits = {.min = 0.0, .max = 0.1},
+       .option = "--sigma-within-turn"},
+      {.name = "estimate",
+       .value = freedoms_code(config),
+       .help =
+           "auto: what the residuals indicate, and scales that are not given; none; or any of scale, once (encoder "
+           "error with one period per revolution), backlash (views in the order taken), focal, centre (of each lens)"},
+      {.name = "scales",
+       .value = &config.estimate_scales,
+       .help = "Also estimate the scale of each encoder (same as --estimate scale)"},
+      {.name = "outliers",
+       .value = words_code(config.reject_outliers, rules),
+       .help = "drop: reject views that contradict the others, naming each; keep"}};
 }
 
 std::vector<std::string> faults(RigConfig config) {

@@ -363,34 +363,34 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
 }
 
 std::string servo_scenario_text() {
-  return R"(# What alidade servo runs. Every key may be omitted; these are the values it then has.
-# rig: rig.yaml                  # heads and cameras; without it: the rig of Xiahou, Chen & Wu, 2015
+  return R"(# Scenario of alidade servo. Every key is optional; these are the defaults.
+# rig: rig.yaml                  # heads and cameras; default: the rig of Xiahou, Chen & Wu, 2015
 target: {path: circle, start_m: [0.173, -0.314, 0.636], radius_m: 0.1, period_s: 10}  # still, sway, step, manoeuvre
-# target: {track: path.csv}      # a path that was recorded: t_s,x_m,y_m,z_m
+# target: {track: path.csv}      # recorded path: t_s,x_m,y_m,z_m
 duration_s: 12
-warm_up_s: 2                     # not counted in the figures
+warm_up_s: 2                     # excluded from the statistics
 sample_period_s: 0.05            # images, encoders, commands
-latency_s: 0                     # from an image to its pixel
-# hidden_s: [5, 6]               # from, to: the target is not seen
+latency_s: 0                     # from capture of an image to its pixel
+# hidden_s: [5, 6]               # from, to: the target is hidden
 plant: {kind: angle, gain: 0.0567, unit: deg, tau_s: 0.1, command_delay_s: 0}
-# plant: {kind: angle, gain: 1, tau_s: 0.06, max_rate_deg_s: 40, max_acceleration_deg_s2: 120}  # as `head --identify` has
+# plant: {kind: angle, gain: 1, tau_s: 0.06, max_rate_deg_s: 40, max_acceleration_deg_s2: 120}  # as written by `head --identify`
 # plant: {kind: rate, gain: 1, unit: rad, tau_s: 0.05, max_rate_deg_s: 180, max_acceleration_deg_s2: 1500,
 #         pan_deg: [-170, 170], tilt_deg: [-30, 90], dead_band: 0, backlash_deg: 0, second_tau_s: 0,
-#         sigma_gain: 0, sigma_tau_s: 0, sigma_command_delay_s: 0}  # as `identify` has them: loops are stable within 3
-mismatch: {gain: 1, tau: 1}      # the plant as it is, over the plant as it is known
+#         sigma_gain: 0, sigma_tau_s: 0, sigma_command_delay_s: 0}  # as written by `identify`; stability is checked within 3σ
+mismatch: {gain: 1, tau: 1}      # true plant / plant known to the controllers
 noise: {sigma_px: 0.5, sigma_encoder_deg: 0.05, encoder_step_deg: 0}
 controllers: [pi, feedforward, lqr, mpc]
-pi: {kp: 2, ki: 10, unit: px}    # command per error; of a rate plant 4/gain and 4/gain, in its unit
+pi: {kp: 2, ki: 10, unit: px}    # command per error; for a rate plant 4/gain and 4/gain, in its unit
 predictive: {rate_gain_per_s: 8, command_weight: 2, range_m: 1}
 filter: {singer_tau_s: 0.4, sigma_deg_s2: [5, 20, 80, 320, 1280], memory_s: 0.5, gate: 20}
 search: {enabled: true, coast_s: 0.3, carry_s: 0.2, speed_deg_s: 57.3, turn_of_view: 0.7, max_radius_deg: 45.8}
-# zoom: {t_s: [3, 7], factor: [1, 3]}  # of all focal lengths, over time; straight in the logarithm between
-# intrinsics: observed           # the loop goes by: given (the rig's), observed (by an on-line observer), true; without a
-                                 # zoom given, with one observed
+# zoom: {t_s: [3, 7], factor: [1, 3]}  # factor of all focal lengths over time, log-linear in between
+# intrinsics: observed           # used by the loop: given (the rig's), observed (by an online observer) or true; default:
+                                 # given without a zoom, observed with one
 # background_points: 24          # static, behind the target, for the observer
 seeds: 8
 specification_px: 10
-robustness: {gain: [0.8, 1.2], tau: [0.7, 1.3], points: 5}   # points: 0 leaves it out
+robustness: {gain: [0.8, 1.2], tau: [0.7, 1.3], points: 5}   # points: 0 skips it
 )";
 }
 

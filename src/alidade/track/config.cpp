@@ -31,24 +31,24 @@ FieldList model_fields(TrackConfig& config) {
   return {
       {.name = "method",
        .value = words_code(config.method, track_method_words()),
-       .help = "Motion of the target: cv (constant velocity), singer, turn, imm (quiet, agile or falling), ballistic "
-               "(free fall); or the filter of xiahou2015",
+       .help = "Motion model of the target: cv (constant velocity), singer, turn, imm (quiet, agile or falling), "
+               "ballistic (free fall); or the filter of xiahou2015",
        .old_options = {"--motion"}},
       {.name = "gravity_m_s2",
        .value = gravity_code(config.gravity_m_s2),
-       .help =
-           "With ballistic and imm: gravity in the rig's world [m/s2] (default: 0 9.80665 0, the first camera level)",
+       .help = "With ballistic and imm: gravity in the rig's world frame [m/s2] (default: 0 9.80665 0, the first "
+               "camera level)",
        .form = "X,Y,Z"},
       {.name = "corrected",
        .value = &config.corrected,
-       .help = "With xiahou2015: pixels and mounting corrected, else as printed"},
+       .help = "With xiahou2015: correct the paper's formulas for pixels and mounting (default: as printed)"},
       {.name = "predict_s",
        .value = &config.predict_s,
-       .help = "Rows so far ahead of each event [s]",
+       .help = "Output predictions this far ahead of each event [s]",
        .limits = positive},
       {.name = "smooth_s",
        .value = &config.smooth_s,
-       .help = "Also smoothed.csv: the path given the observations until so long after [s]; not for imm",
+       .help = "Also write smoothed.csv: the path smoothed with observations up to this much later [s]; not with imm",
        .limits = {0.01, 2.0}},
   };
 }
@@ -57,33 +57,33 @@ FieldList sigma_fields(TrackConfig& config) {
   return {
       {.name = "sigma_a_m_s2",
        .value = &config.sigma_a_m_s2,
-       .help = "The target's acceleration [m/s2] (default: estimated from the innovations)",
+       .help = "σ of the target's acceleration [m/s2] (default: estimated from the innovations)",
        .limits = positive},
       {.name = "sigma_px",
        .value = &config.sigma_px,
-       .help =
-           "σ of the target's pixel coordinate [px] (default: estimated from the innovations, 0.5 where they agree)",
+       .help = "σ of the target's pixel coordinates [px] (default: estimated from the innovations, or 0.5 if they "
+               "agree with it)",
        .limits = positive,
        .option = "--sigma-px"},
       {.name = "sigma_clock_s",
        .value = &config.sigma_clock_s,
-       .help = "σ of the delay between a head's clock and its images, and of its angles against these [s], counted in "
-               "every σ (default: exact)",
+       .help = "σ of the offset between a head's clock and its images, and between its angles and images [s], included "
+               "in every σ (default: exact)",
        .limits = positive},
       {.name = "sigma_angle_rad",
        .value = &config.sigma_angle_rad,
-       .help = "σ of an encoder of which the rig states none [rad]",
+       .help = "σ of an encoder for which the rig gives none [rad]",
        .limits = positive},
   };
 }
 
 FieldList range_fields(TrackConfig& config) {
   return {
-      {.name = "min_depth_m", .value = &config.min_depth_m, .help = "Working range, nearest [m]", .limits = positive},
-      {.name = "max_depth_m", .value = &config.max_depth_m, .help = "Working range, furthest [m]", .limits = positive},
+      {.name = "min_depth_m", .value = &config.min_depth_m, .help = "Minimum working range [m]", .limits = positive},
+      {.name = "max_depth_m", .value = &config.max_depth_m, .help = "Maximum working range [m]", .limits = positive},
       {.name = "keep_rows",
        .value = &config.keep_rows,
-       .help = "Of rows from standard input: how many of the newest the final result covers at least; at most twice as "
+       .help = "Rows from standard input: minimum number of latest rows that the final result covers; at most twice as "
                "many",
        .limits = {.min = 100, .max = 1e9}}};
 }

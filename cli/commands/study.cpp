@@ -163,24 +163,28 @@ ExitCode run_study(const StudyArgs<Study>& args, Run& run) {
 
 void add_study_options(CLI::App& command, StudyOptions& options) {
   const std::string group = "Trials";
-  command.add_option("--trials", options.trials, "How many; of each value that is varied")
+  command.add_option("--trials", options.trials, "Number of trials, for each value of --vary")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1000000000000}))
       ->type_name("N")
       ->capture_default_str()
       ->group(group);
-  command.add_option("--vary", options.vary, "A curve: a setting from a value to another, by steps, as photos=4:30:2")
+  command
+      .add_option("--vary", options.vary,
+                  "Vary a setting from one value to another in steps, for example photos=4:30:2")
       ->type_name("NAME=FROM:TO:STEP")
       ->group(group);
-  command.add_option("--trial", options.trial, "That one alone, from 0, with the report and the inputs that it had")
+  command.add_option("--trial", options.trial, "Run only trial K (from 0), and write its report and inputs")
       ->type_name("K")
       ->group(group);
   command
       .add_option("--shard", options.shard,
-                  "The I-th of N parts, from 0, for machines that do not share a job; see study merge")
+                  "Run part I of N (from 0), for machines that do not share a job; see study merge")
       ->type_name("I/N")
       ->group(group);
-  command.add_flag("--resume", options.resume, "Go on from the blocks in DIR/blocks")->group(group);
-  command.add_option("--block", options.block, "Trials of a block at most: what a killed run loses (0: by the study)")
+  command.add_flag("--resume", options.resume, "Continue from the blocks in DIR/blocks")->group(group);
+  command
+      .add_option("--block", options.block,
+                  "Maximum trials per block, which a killed run loses (0: the study's default)")
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}))
       ->type_name("N")
       ->capture_default_str()
@@ -214,10 +218,12 @@ ExitCode merge_study(const MergeArgs& args, Run& run) {
 void add_study_merge(App& app) {
   auto args = std::make_shared<MergeArgs>();
   CLI::App& command = app.add_command({.name = "study merge",
-                                       .summary = "The shards of a study, put together",
+                                       .summary = "Merge the shards of a study",
                                        .examples = "  alidade study merge part-0 part-1 part-2 --out whole"},
                                       [args](Run& run) { return merge_study(*args, run); });
-  command.add_option("folders", args->folders, "What --shard left, one folder a shard")->required()->type_name("DIR");
+  command.add_option("folders", args->folders, "Result folders of --shard, one per shard")
+      ->required()
+      ->type_name("DIR");
 }
 
 }  // namespace
@@ -242,27 +248,28 @@ StudyEngine& study_engine() {
 }
 
 void add_study(App& app) {
-  app.add_group("study", "Campaigns of simulated trials: bias, error over the bound, and what σ covers");
-  add_one_study<ObserveStudy>(app, "Trials of a rotating camera whose intrinsics are observed",
+  app.add_group(
+      "study",
+      "Monte Carlo studies on simulated data: bias, error relative to the Cramér–Rao bound, and coverage of σ");
+  add_one_study<ObserveStudy>(app, "Intrinsics of a rotating camera (observe)",
                               "  alidade study observe --trials 1000000 --out far\n"
                               "  alidade study observe --trials 2000 --method hybrid --vary rows=60:240:60\n"
                               "  alidade study observe --trials 1000000 --trial 48211 --out one\n"
                               "  mpirun -n 8 alidade-study observe --trials 100000000 --out far");
-  add_one_study<CalibrateStudy>(app, "Trials of a calibration by photos of a board",
+  add_one_study<CalibrateStudy>(app, "Calibration from photos of a board (calibrate)",
                                 "  alidade study calibrate --trials 2400 --photos 12 --noise 0.1\n"
                                 "  alidade study calibrate --trials 500 --vary photos=4:30:2 --out curve\n"
                                 "  alidade study calibrate --trials 100000 --shard 3/8 --out part-3");
-  add_one_study<RangefinderStudy>(app, "Trials of a laser rangefinder beside a camera",
+  add_one_study<RangefinderStudy>(app, "Laser rangefinder beside a camera (rangefinder)",
                                   "  alidade study rangefinder --trials 2000\n"
                                   "  alidade study rangefinder --trials 500 --vary shots=6:30:4");
-  add_one_study<TrackStudy>(app, "Trials of a target that two heads follow",
+  add_one_study<TrackStudy>(app, "Target tracked by two heads (track)",
                             "  alidade study track --trials 1000 --scenario B");
-  add_one_study<LocalizeStudy>(app, "Trials of a camera localised under water",
-                               "  alidade study localize --trials 200");
-  add_one_study<TurnedStudy>(app, "Trials of photos of a camera turned by hand",
+  add_one_study<LocalizeStudy>(app, "Camera localised under water (localize)", "  alidade study localize --trials 200");
+  add_one_study<TurnedStudy>(app, "Intrinsics from photos of a camera rotated by hand",
                              "  alidade study turned --trials 200 --on-the-spot --wrong-matches 0.3\n"
                              "  alidade study turned --trials 200 --vary lever=0:0.2:0.05");
-  add_one_study<ChainStudy>(app, "Trials of a chain: photos, lenses, the rig of two heads, a target followed",
+  add_one_study<ChainStudy>(app, "Whole chain: photos, lenses, rig of two heads, tracked target",
                             "  alidade study chain --trials 200 --vary range=1:13:4\n"
                             "  alidade study chain --trials 200 --range 6 --exact");
   add_study_merge(app);

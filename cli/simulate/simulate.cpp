@@ -125,39 +125,39 @@ ExitCode simulate_board(const BoardArgs& args, Run& run) {
 void add_board_scenario(App& app) {
   auto args = std::make_shared<BoardArgs>();
   CLI::App& command = app.add_command(
-      {"simulate board", "Photos of a calibration board, its corners, and the camera, poses and board behind them",
+      {"simulate board", "Photos of a calibration board and its corners, with the true camera, poses and board",
        "  alidade simulate board --board 9x6 --square 0.025 --photos 20 --out photos\n"
        "  alidade simulate board --board 9x6 --square 0.025 --corners-only --sigma-px 0.05",
        true},
       [args](Run& run) { return simulate_board(*args, run); });
   add_board_options(command, args->board);
-  command.add_option("--photos", args->photos, "How many photos")->check(CLI::Range(1, 100000))->capture_default_str();
-  command.add_option("--camera", args->camera_file, "The true camera; without it one is made up")->type_name("FILE");
-  command.add_option("--model", args->model, "Lens of the made-up camera")->type_name("NAME")->capture_default_str();
-  command.add_option("--size", args->size, "Image of the made-up camera")->type_name("WxH")->capture_default_str();
-  add_number(command, "--max-tilt-deg", args->max_tilt_deg, "Largest tilt of the board", 0.0, 80.0);
-  add_number(command, "--bow-mm", args->bow_mm, "Height of the board's centre over its corners", -1000.0, 1000.0);
-  add_number(command, "--shape-sigma-mm", args->shape_sigma_mm, "Scatter of the board's points about their plan", 0.0,
-             1000.0);
-  add_number(
-      command, "--autofocus", args->autofocus,
-      "An autofocus that is on: the focal length is longer by this share with the board at half a metre than far "
-      "away, where truth_camera.yaml has it",
-      -0.2, 0.2);
-  add_number(command, "--blur", args->blur_px, "Sigma of the optical blur [px]", 0.0, 20.0);
-  add_number(command, "--noise", args->noise, "Sigma of the grey noise, of 255", 0.0, 100.0);
-  add_number(command, "--sigma-px", args->sigma_px, "Sigma of the corners in corners.csv", 0.0, 100.0);
+  command.add_option("--photos", args->photos, "Number of photos")->check(CLI::Range(1, 100000))->capture_default_str();
+  command.add_option("--camera", args->camera_file, "True camera (default: an example camera)")->type_name("FILE");
+  command.add_option("--model", args->model, "Lens model of the example camera")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command.add_option("--size", args->size, "Image size of the example camera")->type_name("WxH")->capture_default_str();
+  add_number(command, "--max-tilt-deg", args->max_tilt_deg, "Largest tilt of the board [deg]", 0.0, 80.0);
+  add_number(command, "--bow-mm", args->bow_mm, "Height of the board's centre above its corners [mm]", -1000.0, 1000.0);
+  add_number(command, "--shape-sigma-mm", args->shape_sigma_mm,
+             "σ of the board points about their nominal positions [mm]", 0.0, 1000.0);
+  add_number(command, "--autofocus", args->autofocus,
+             "Autofocus left on: relative increase of the focal length with the board at 0.5 m, over that far away "
+             "(the one in truth_camera.yaml)",
+             -0.2, 0.2);
+  add_number(command, "--blur", args->blur_px, "σ of the optical blur [px]", 0.0, 20.0);
+  add_number(command, "--noise", args->noise, "σ of the grey-level noise, of 255", 0.0, 100.0);
+  add_number(command, "--sigma-px", args->sigma_px, "σ of the corners in corners.csv [px]", 0.0, 100.0);
   add_number(command, "--shared-px", args->shared_px,
-             "Errors in corners.csv that the corners of a photo share: sigma of each term of "
-             "a smooth field",
-             0.0, 100.0);
-  command.add_flag("--corners-only", args->corners_only, "No photos");
+             "Errors in corners.csv shared by the corners of a photo: σ of each term of a smooth field [px]", 0.0,
+             100.0);
+  command.add_flag("--corners-only", args->corners_only, "Write no photos");
 }
 
 }  // namespace
 
 void add_simulate(App& app) {
-  app.add_group("simulate", "Measurements with known truth, in the files that the other commands read");
+  app.add_group("simulate", "Simulate measurements with ground truth, in the files that the other commands read");
   constexpr std::array scenarios{add_board_scenario,     add_fleet_scenario,
                                  add_head_scenario,      add_rangefinder_scenario,
                                  add_rig_scenario,       add_rotation_scenario,

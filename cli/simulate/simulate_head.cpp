@@ -58,33 +58,32 @@ ExitCode simulate_head(const SimulateHeadArgs& args, Run& run) {
 void add_head_scenario(App& app) {
   auto args = std::make_shared<SimulateHeadArgs>();
   CLI::App& command = app.add_command(
-      {"simulate head", "A pan-tilt head and its camera as servers: rotctl, ONVIF, and motion JPEG over HTTP",
+      {"simulate head", "Pan-tilt head and its camera as servers: rotctl, ONVIF, and motion JPEG over HTTP",
        "  alidade simulate head --rotctl 4533 --stream 8090 --truth truth.csv\n"
        "  alidade simulate head --rotctl 4533 --stream 8090 --head 'rate=40&backlash=0.1' --camera "
        "'size=640x480&mount=1:-2:3&delay=0.04'\n",
        false, false},
       [args](Run& run) { return simulate_head(*args, run); });
-  command.add_option("--rotctl", args->rotctl_port, "Port of the head, as Hamlib's rotctld; 0: any that is free")
+  command.add_option("--rotctl", args->rotctl_port, "Port of the head as Hamlib's rotctld; 0: any free port")
       ->check(CLI::Range(0, 65535));
-  command.add_option("--onvif", args->onvif_port, "Port of the head, as a network camera; 0: any that is free")
+  command.add_option("--onvif", args->onvif_port, "Port of the head as a network camera; 0: any free port")
       ->check(CLI::Range(0, 65535));
-  command.add_option("--user", args->user, "The only user accepted by ONVIF; the password is in ALIDADE_PASSWORD");
-  command.add_option("--stream", args->stream_port, "Port of its camera, motion JPEG; 0: any that is free")
+  command.add_option("--user", args->user, "The only user accepted by ONVIF; password in ALIDADE_PASSWORD");
+  command.add_option("--stream", args->stream_port, "Port of its camera (motion JPEG); 0: any free port")
       ->check(CLI::Range(0, 65535));
-  command.add_option("--address", args->address, "Where to listen")->capture_default_str();
-  command.add_option(
-      "--head", args->head,
-      "The head, KEY=VALUE&…: seed, rate, accel, tau, latency, backlash, dead_band, step, update_hz, zoom, lie, …");
+  command.add_option("--address", args->address, "Address to listen on")->capture_default_str();
+  command.add_option("--head", args->head,
+                     "Parameters of the head, KEY=VALUE&…: seed, rate, accel, tau, latency, backlash, dead_band, step, "
+                     "update_hz, zoom, lie, …");
   command.add_option("--camera", args->camera,
-                     "The camera, KEY=VALUE&…: size, fx, fy, cx, cy, k1, mount (x:y:z, degrees), fps, delay, noise, "
-                     "jump, target, board "
-                     "(columns:rows:square:distance:pan:tilt, m and degrees), seed");
-  command.add_option("--truth", args->truth, "Where each frame's time and true angles are written, CSV")
+                     "Parameters of the camera, KEY=VALUE&…: size, fx, fy, cx, cy, k1, mount (x:y:z, degrees), fps, "
+                     "delay, noise, jump, target, board (columns:rows:square:distance:pan:tilt, m and degrees), seed");
+  command.add_option("--truth", args->truth, "File to write each frame's time and true angles to, CSV")
       ->type_name("FILE");
-  command.add_option("--watchdog", args->watchdog_s, "Stops by itself after this many seconds of silence; 0: never")
+  command.add_option("--watchdog", args->watchdog_s, "The head stops after this time without a command [s]; 0: never")
       ->check(number_within(0.0, 3600.0))
       ->capture_default_str();
-  command.add_option("--seconds", args->seconds, "Ends by itself after so long (default: at Ctrl-C)")
+  command.add_option("--seconds", args->seconds, "Exit after this time [s] (default: at Ctrl-C)")
       ->check(number_within(0.0, 1e9));
 }
 

@@ -125,47 +125,51 @@ ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
 
 /// What of the readings and the camera file is not right.
 void add_mistakes(CLI::App& command, SimulateRangefinderArgs& args) {
-  add_number(command, "--offset-m", args.mistake.offset_m, "What each reading is too long by [m]", -1.0, 1.0);
-  add_number(command, "--focal-error", args.mistake.focal, "Share by which the camera file's focal length is too long",
+  add_number(command, "--offset-m", args.mistake.offset_m, "Constant error of the readings [m]", -1.0, 1.0);
+  add_number(command, "--focal-error", args.mistake.focal, "Relative error of the focal length in the camera file",
              -0.5, 0.5);
-  add_number(command, "--centre-error", args.mistake.centre_px, "Error of its centre in u and v [px]", -1e3, 1e3);
-  add_number(command, "--k1-error", args.mistake.k1, "What its k1 is too large by", -1.0, 1.0);
-  add_number(command, "--p1-error", args.mistake.p1, "What its p1 is too large by", -0.1, 0.1);
-  add_number(command, "--drift-m", args.mistake.drift_m,
-             "What the readings drift by from the first shot to the last [m]", -1.0, 1.0);
-  add_number(command, "--bend-m", args.mistake.bend_m, "Curvature of the readings: too long by this 1 m from 2 m [m]",
+  add_number(command, "--centre-error", args.mistake.centre_px, "Error of cx and cy in the camera file [px]", -1e3,
+             1e3);
+  add_number(command, "--k1-error", args.mistake.k1, "Error of k1 in the camera file", -1.0, 1.0);
+  add_number(command, "--p1-error", args.mistake.p1, "Error of p1 in the camera file", -0.1, 0.1);
+  add_number(command, "--drift-m", args.mistake.drift_m, "Drift of the readings from the first shot to the last [m]",
              -1.0, 1.0);
-  add_number(command, "--wander-px", args.mistake.wander_px, "What the spots move by from the first shot to the last",
+  add_number(command, "--bend-m", args.mistake.bend_m,
+             "Quadratic error of the readings: this size at 1 m and 3 m, zero at 2 m [m]", -1.0, 1.0);
+  add_number(command, "--wander-px", args.mistake.wander_px, "Drift of the spots from the first shot to the last [px]",
              -1e3, 1e3);
   add_number(command, "--bow-m", args.noise.bow_m,
-             "Bow of the board along its rows: of its centre over its left and right border [m]", -0.1, 0.1);
-  add_number(command, "--twist-m", args.noise.twist_m, "Twist of the board: of its corners out of its plane [m]", -0.1,
-             0.1);
-  add_number(command, "--incidence-m", args.noise.incidence_m,
-             "What a reading at 45° is too long by, growing with the tangent of the angle of incidence [m]", -1.0, 1.0);
-  add_number(command, "--sheet-m", args.noise.sheet_m, "What the beam hits lies before the plane of the corners by [m]",
+             "Bow of the board along its rows: height of its centre above its left and right edges [m]", -0.1, 0.1);
+  add_number(command, "--twist-m", args.noise.twist_m, "Twist of the board: height of its corners above its plane [m]",
              -0.1, 0.1);
-  command.add_flag("--exchange-uv", args.mistake.exchange_uv, "u and v of the spots are exchanged");
-  command.add_option("--unit", args.unit, "Of the readings in the table")
+  add_number(command, "--incidence-m", args.noise.incidence_m,
+             "Error of a reading at 45° incidence, proportional to the tangent of the angle [m]", -1.0, 1.0);
+  add_number(command, "--sheet-m", args.noise.sheet_m,
+             "Distance of the surface hit by the beam in front of the plane of the corners [m]", -0.1, 0.1);
+  command.add_flag("--exchange-uv", args.mistake.exchange_uv, "Swap u and v of the spots");
+  command.add_option("--unit", args.unit, "Unit of the readings in the table")
       ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))
       ->capture_default_str();
-  command.add_option("--shift-rows", args.mistake.shift_rows, "Ranges are this many rows late")
+  command.add_option("--shift-rows", args.mistake.shift_rows, "Delay of the ranges, in rows of the table")
       ->check(CLI::Range(-100, 100))
       ->capture_default_str();
 }
 
 /// Photos instead of spots and corners, and how they look.
 void add_photo_options(CLI::App& command, SimulateRangefinderArgs& args) {
-  add_number(command, "--speckle", args.speckle, "With --photos: contrast of the laser's speckle, 1 is full", 0.0, 1.0);
-  command.add_flag("--bayer", args.bayer, "With --photos: one colour a pixel, the others interpolated");
-  command.add_option("--jpeg", args.jpeg, "With --photos: compressed with this quality, 0: not")
+  add_number(command, "--speckle", args.speckle, "With --photos: contrast of the laser speckle; 1: full", 0.0, 1.0);
+  command.add_flag("--bayer", args.bayer,
+                   "With --photos: Bayer pattern, one colour per pixel, the others interpolated");
+  command.add_option("--jpeg", args.jpeg, "With --photos: JPEG quality; 0: uncompressed")
       ->check(CLI::Range(0, 100))
       ->capture_default_str();
-  command.add_option("--stickers", args.stickers, "With --photos: red spots on the board that are not the laser's")
+  command
+      .add_option("--stickers", args.stickers,
+                  "With --photos: number of red spots on the board that are not the laser's")
       ->check(CLI::Range(0, 10))
       ->capture_default_str();
-  command.add_flag("--photos", args.photos, "Render the photos instead of spots and corners");
-  command.add_flag("--photos-off", args.photos_off, "With --photos: each also with the laser off");
+  command.add_flag("--photos", args.photos, "Render photos instead of spots and corners");
+  command.add_flag("--photos-off", args.photos_off, "With --photos: also render each photo with the laser off");
   command.add_option("--laser", args.laser, "Colour of the laser in photos: red or green")
       ->check(CLI::IsMember({"red", "green"}))
       ->capture_default_str();
@@ -176,7 +180,7 @@ void add_photo_options(CLI::App& command, SimulateRangefinderArgs& args) {
 void add_rangefinder_scenario(App& app) {
   auto args = std::make_shared<SimulateRangefinderArgs>();
   CLI::App& command = app.add_command(
-      {"simulate rangefinder", "Shots of a laser rangefinder beside a camera, with boards and spots, and the truth",
+      {"simulate rangefinder", "Shots of a laser rangefinder beside a camera, with boards, spots and ground truth",
        "  alidade simulate rangefinder --out shots && alidade rangefinder shots/shots.csv --camera shots/camera.yaml "
        "\\\n"
        "    --corners shots/corners.csv --board 9x6 --square 0.04\n"
@@ -185,15 +189,15 @@ void add_rangefinder_scenario(App& app) {
       [args](Run& run) { return simulate_rangefinder(*args, run); });
   command.add_option("--scenario", args->scenario, fmt::format("{}", fmt::join(rangefinder_scenarios(), ", ")))
       ->capture_default_str();
-  command.add_option("--shots", args->shots, "How many shots (default: the scenario's)")->check(CLI::Range(1, 10000));
-  command.add_option("--camera", args->camera, "The true camera; without it one is made up")->type_name("FILE");
-  add_number(command, "--sigma-range-m", args->sigma_range_m, "Noise of a reading [m]", 0.0, 1.0);
-  add_number(command, "--sigma-px", args->noise.sigma_spot_px, "Noise of a spot's coordinate", 0.0, 100.0);
-  add_number(command, "--sigma-corner-px", args->noise.sigma_corner_px, "Noise of a corner's coordinate", 0.0, 100.0);
-  add_number(command, "--outliers", args->noise.outlier_share, "Share of shots whose beam passed the board", 0.0, 0.9);
-  add_number(command, "--scale", args->scale, "Metres for each metre read", 0.5, 2.0);
+  command.add_option("--shots", args->shots, "Number of shots (default: the scenario's)")->check(CLI::Range(1, 10000));
+  command.add_option("--camera", args->camera, "True camera (default: an example camera)")->type_name("FILE");
+  add_number(command, "--sigma-range-m", args->sigma_range_m, "σ of a reading [m]", 0.0, 1.0);
+  add_number(command, "--sigma-px", args->noise.sigma_spot_px, "σ of a spot's coordinate [px]", 0.0, 100.0);
+  add_number(command, "--sigma-corner-px", args->noise.sigma_corner_px, "σ of a corner's coordinate [px]", 0.0, 100.0);
+  add_number(command, "--outliers", args->noise.outlier_share, "Share of shots whose beam misses the board", 0.0, 0.9);
+  add_number(command, "--scale", args->scale, "True range / range read", 0.5, 2.0);
   add_number(command, "--sigma-px-near", args->noise.sigma_spot_near_px,
-             "Noise of a spot at 1 m beyond that; falls with the range", 0.0, 100.0);
+             "Additional σ of a spot at 1 m, falling with range [px]", 0.0, 100.0);
   add_mistakes(command, *args);
   add_photo_options(command, *args);
 }

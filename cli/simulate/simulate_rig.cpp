@@ -123,7 +123,7 @@ ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
 void add_rig_scenario(App& app) {
   auto args = std::make_shared<SimulateRigArgs>();
   CLI::App& command = app.add_command(
-      {"simulate rig", "Views of boards by two pan-tilt heads, with the angles their encoders read, and the truth",
+      {"simulate rig", "Views of boards by two pan-tilt heads, with encoder angles and ground truth",
        "  alidade simulate rig --out views && alidade rig views/views.csv --camera views/camera_1.yaml \\\n"
        "    --camera views/camera_2.yaml --board 9x6 --square 0.025 --sigma-square 1e-6 --sigma-scale 1e-6\n"
        "  alidade simulate rig --photos --out photos",
@@ -132,42 +132,45 @@ void add_rig_scenario(App& app) {
   command.add_option("--scenario", args->scenario, "reference, pan_only, tilt_only, unlinked, one_head")
       ->check(CLI::IsMember({"reference", "pan_only", "tilt_only", "unlinked", "one_head"}))
       ->capture_default_str();
-  command.add_option("--rig", args->rig, "Heads that the drawn ones are near (default: the paper's two)")
+  command
+      .add_option("--rig", args->rig, "Nominal rig that the random one is close to (default: the paper's two heads)")
       ->type_name("FILE");
-  command.add_option("--boards", args->boards, "Positions of the board")
+  command.add_option("--boards", args->boards, "Number of board positions")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command.add_option("--views", args->views, "Views of each board by each head, at most")
+  command.add_option("--views", args->views, "Maximum views of each board position by each head")
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
-  add_number(command, "--sigma-px", args->sigma_px, "Noise of a corner's coordinate", 0.0, 100.0);
-  add_number(command, "--sigma-angle-deg", args->sigma_angle_deg, "Noise of a reading [deg]", 0.0, 10.0);
-  add_number(command, "--wrong", args->wrong, "Share of the views with the angles of another", 0.0, 0.5);
-  add_number(command, "--scale", args->scale, "Radians of each axis for each radian read", 0.5, 2.0);
-  add_number(command, "--once-deg", args->once_deg, "Amplitude of an error of one period a turn of each axis [deg]",
-             0.0, 15.0);
-  add_number(command, "--twice-deg", args->twice_deg, "The same of two periods a turn [deg]", 0.0, 15.0);
+  add_number(command, "--sigma-px", args->sigma_px, "σ of a corner's coordinate [px]", 0.0, 100.0);
+  add_number(command, "--sigma-angle-deg", args->sigma_angle_deg, "σ of an encoder reading [deg]", 0.0, 10.0);
+  add_number(command, "--wrong", args->wrong, "Share of the views that have the angles of another view", 0.0, 0.5);
+  add_number(command, "--scale", args->scale, "True angle / angle read, of each axis", 0.5, 2.0);
+  add_number(command, "--once-deg", args->once_deg,
+             "Amplitude of an encoder error with one period per revolution, each axis [deg]", 0.0, 15.0);
+  add_number(command, "--twice-deg", args->twice_deg, "Likewise with two periods per revolution [deg]", 0.0, 15.0);
   add_number(command, "--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
   add_number(command, "--moved-mm", args->moved_mm,
-             "σ of each coordinate by which boards are moved between the heads' views [mm]", 0.0, 100.0);
-  add_number(command, "--wrong-corners", args->wrong_corners, "Share of the corners that are up to 30 px elsewhere",
-             0.0, 0.5);
-  add_number(command, "--stretch", args->stretch, "By how much wider the board's columns are printed than its rows",
-             -0.1, 0.1);
-  add_number(command, "--bend-mm", args->bend_mm, "By which the board's ends stand off its middle [mm]", -20.0, 20.0);
-  add_number(command, "--focal-error", args->mistake.focal,
-             "Share by which the camera files' focal lengths are too long", -0.5, 0.5);
-  add_number(command, "--centre-error", args->mistake.centre_px, "Error of their centres in u and v [px]", -1e3, 1e3);
-  command.add_flag("--swap-angles", args->mistake.swap_angles, "Pan and tilt are exchanged");
-  command.add_flag("--flip-pan", args->mistake.flip_pan, "Pan counts the other way");
-  command.add_flag("--mirror", args->mistake.mirror, "Images are mirrored");
-  command.add_flag("--swap-heads", args->mistake.swap_heads, "The heads' numbers are exchanged");
-  command.add_flag("--shift-rows", args->mistake.shift_rows, "Each view has the angles of the one before");
+             "σ of each coordinate of the board's movement between the heads' views [mm]", 0.0, 100.0);
+  add_number(command, "--wrong-corners", args->wrong_corners, "Share of the corners displaced by up to 30 px", 0.0,
+             0.5);
+  add_number(command, "--stretch", args->stretch,
+             "Relative stretch of the printed column spacing against the row spacing", -0.1, 0.1);
+  add_number(command, "--bend-mm", args->bend_mm, "Bend of the board: height of its ends above its centre [mm]", -20.0,
+             20.0);
+  add_number(command, "--focal-error", args->mistake.focal, "Relative error of the focal lengths in the camera files",
+             -0.5, 0.5);
+  add_number(command, "--centre-error", args->mistake.centre_px, "Error of cx and cy in the camera files [px]", -1e3,
+             1e3);
+  command.add_flag("--swap-angles", args->mistake.swap_angles, "Swap pan and tilt");
+  command.add_flag("--flip-pan", args->mistake.flip_pan, "Reverse the sign of pan");
+  command.add_flag("--mirror", args->mistake.mirror, "Mirror the images");
+  command.add_flag("--swap-heads", args->mistake.swap_heads, "Swap the numbers of the heads");
+  command.add_flag("--shift-rows", args->mistake.shift_rows, "Give each view the angles of the previous one");
   add_number(command, "--pan-read", args->mistake.pan_read,
-             "What the second head's pan column has of its true angles (0.5: half)", 0.1, 10.0);
+             "Pan column / true pan angle of the second head (0.5: half)", 0.1, 10.0);
   command.add_flag("--turn-corners", args->mistake.turn_corners,
-                   "The second head's corners are numbered from the other end of the board");
-  command.add_flag("--photos", args->photos, "Render the photos instead of corners");
+                   "Number the second head's corners from the other end of the board");
+  command.add_flag("--photos", args->photos, "Render photos instead of corners");
 }
 
 }  // namespace alidade::cli

@@ -263,33 +263,39 @@ void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
     command.add_option(name, values, help)->delimiter(',')->expected(count)->check(finite_number());
   };
   RotationFaults& faults = args.faults;
-  add_number(command, "--encoder-scale", faults.angle_scale, "Angles as measured over the true ones", 0.1, 10.0);
-  add_number(command, "--backlash-deg", args.backlash_deg, "Play between the encoders and the camera [°]", 0.0, 10.0);
-  numbers("--curve-deg", args.curve_deg, 2, "Amplitudes of the encoders' error once and twice a turn [°]");
+  add_number(command, "--encoder-scale", faults.angle_scale, "Measured angle / true angle", 0.1, 10.0);
+  add_number(command, "--backlash-deg", args.backlash_deg, "Backlash between the encoders and the camera [°]", 0.0,
+             10.0);
+  numbers("--curve-deg", args.curve_deg, 2,
+          "Amplitudes of encoder errors with one and with two periods per revolution [°]");
   add_number(command, "--axes-skew-deg", args.axes_skew_deg,
-             "Of a head: the tilt axis is rotated by it about the view, from where it is perpendicular to the pan axis",
+             "With --source head: rotation of the tilt axis about the optical axis, away from perpendicular to the pan "
+             "axis [deg]",
              -10.0, 10.0);
-  numbers("--zero-drift", args.zero_drift, 2, "Of the zeros of pan, tilt [rad/s]");
-  numbers("--signs", args.signs, 2, "1 or -1: how pan and tilt count");
-  command.add_flag("--swap-axes", faults.swaps_axes, "Pan and tilt are exchanged");
-  numbers("--bias", args.bias, 3, "Of the rates x,y,z [rad/s]");
-  numbers("--mount-deg", args.mount_deg, 3, "The camera on its mount: rotation vector x,y,z [°]");
-  add_number(command, "--line-time", args.shutter_s, "Rolling shutter: last row after the first [s]", -0.2, 0.2);
-  add_number(command, "--clock-rate", args.clock_rate, "The images' clock over the rotation's, less one", -0.1, 0.1);
-  add_number(command, "--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
+  numbers("--zero-drift", args.zero_drift, 2, "Drift of the encoder zeros of pan, tilt [rad/s]");
+  numbers("--signs", args.signs, 2, "Sign of pan and tilt: 1 or -1");
+  command.add_flag("--swap-axes", faults.swaps_axes, "Swap pan and tilt");
+  numbers("--bias", args.bias, 3, "Bias of the rates x,y,z [rad/s]");
+  numbers("--mount-deg", args.mount_deg, 3, "Rotation of the camera on its mount, rotation vector x,y,z [°]");
+  add_number(command, "--line-time", args.shutter_s, "Rolling shutter: time from the first row to the last [s]", -0.2,
+             0.2);
+  add_number(command, "--clock-rate", args.clock_rate,
+             "Relative rate error of the image clock against the rotation clock", -0.1, 0.1);
+  add_number(command, "--focal-drift", args.drift_per_s, "Relative growth of fx and fy per second", -0.1, 0.1);
   const auto every = [&](const char* name, int& value, const char* help) {
     command.add_option(name, value, help)->check(CLI::Range(0, 100000))->capture_default_str();
   };
-  every("--missing-every", faults.missing_every, "Of so many images the last is missing, the others numbered through");
-  every("--repeated-every", faults.repeated_every, "Of so many images the last is the one before it once more");
-  add_number(command, "--wrong", faults.wrong_share, "Share of pixels that are anywhere; of wrong matches in pairs.csv",
-             0.0, 0.95);
-  add_number(command, "--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);
+  every("--missing-every", faults.missing_every, "Drop every N-th image and number the others consecutively; 0: none");
+  every("--repeated-every", faults.repeated_every, "Replace every N-th image by the previous one; 0: none");
+  add_number(command, "--wrong", faults.wrong_share,
+             "Share of pixels at random positions; in pairs.csv, of wrong matches", 0.0, 0.95);
+  add_number(command, "--swapped", faults.swapped_share, "Share of pixels swapped with another point's", 0.0, 0.95);
   add_number(command, "--moving", faults.moving_share,
-             "Share of points that move, of those in pairs.csv, of a video's image", 0.0, 1.0);
-  add_number(command, "--lasting-px", faults.noise_px, "Further noise of each track, which lasts [px]", 0.0, 100.0);
-  add_number(command, "--lasting-s", faults.noise_lasts_s, "How long it lasts [s]", 0.0, 1000.0);
-  command.add_flag("!--no-range", args.with_range, "With --depth: without range_m");
+             "Share of moving points (of those in pairs.csv; with --video, of the image area)", 0.0, 1.0);
+  add_number(command, "--lasting-px", faults.noise_px, "Additional time-correlated noise of each track [px]", 0.0,
+             100.0);
+  add_number(command, "--lasting-s", faults.noise_lasts_s, "Correlation time of that noise [s]", 0.0, 1000.0);
+  command.add_flag("!--no-range", args.with_range, "With --depth: omit column range_m");
 }
 
 /// How it rotates and zooms, and what it sees.
@@ -297,22 +303,26 @@ void add_world_options(CLI::App& command, SimulateRotationArgs& args) {
   const auto word = [&](const char* name, std::string& value, const char* help, std::vector<std::string> words) {
     command.add_option(name, value, help)->check(CLI::IsMember(std::move(words)))->capture_default_str();
   };
-  word("--source", args.source, "How the rotation is measured: rate, head or attitude", {"rate", "head", "attitude"});
-  word("--motion", args.motion, "sway (the paper's, eq. 27), pan, tilt, roll or still",
+  word("--source", args.source, "Measurement of the rotation: rate, head (angles) or attitude",
+       {"rate", "head", "attitude"});
+  word("--motion", args.motion, "Motion: sway (of the paper, eq. 27), pan, tilt, roll or still",
        {"sway", "pan", "tilt", "roll", "still"});
-  word("--zoom", args.zoom, "none, ramp (eq. 29), step (+10 % at 6 s) or sway (±15 %, never at rest)",
+  word("--zoom", args.zoom, "Zoom: none, ramp (eq. 29), step (+10 % at 6 s) or sway (±15 %, always changing)",
        {"none", "ramp", "step", "sway"});
-  command.add_option("--points", args.points, "How many points")->check(CLI::Range(1, 5000))->capture_default_str();
+  command.add_option("--points", args.points, "Number of points")->check(CLI::Range(1, 5000))->capture_default_str();
   command.add_option("--size", args.size, "Image size")->type_name("WxH")->capture_default_str();
   command.add_option("--intrinsics", args.k, "True fx,fy,cx,cy [px]")
       ->delimiter(',')
       ->expected(4)
       ->check(finite_number());
-  command.add_option("--lever", args.lever, "Camera centre from the centre of rotation, x,y,z [m]")
+  command
+      .add_option("--lever", args.lever, "Position of the camera centre relative to the centre of rotation, x,y,z [m]")
       ->delimiter(',')
       ->expected(3)
       ->check(finite_number());
-  command.add_option("--depth", args.depth, "Least and largest depth of the points [m]; adds range_m of the first")
+  command
+      .add_option("--depth", args.depth,
+                  "Smallest and largest depth of the points [m]; adds column range_m of the first point")
       ->delimiter(',')
       ->expected(2)
       ->check(positive_number());
@@ -320,23 +330,22 @@ void add_world_options(CLI::App& command, SimulateRotationArgs& args) {
 
 /// Frames and photos instead of points, and how they look.
 void add_image_options(CLI::App& command, SimulateRotationArgs& args) {
-  command.add_flag("--video", args.video, "Render frames instead of points: frames/, angles.csv");
+  command.add_flag("--video", args.video, "Render frames instead of points; writes frames/ and angles.csv");
   command
-      .add_option(
-          "--photos", args.photos,
-          "Render so many photos of a camera that is rotated by hand instead, and matches between them: photos/, "
-          "pairs.csv")
+      .add_option("--photos", args.photos,
+                  "Render this many photos of a camera rotated by hand instead, and matches between them; writes "
+                  "photos/ and pairs.csv")
       ->check(CLI::Range(2, 200));
-  add_number(command, "--zoomed", args.zoomed, "Focal length of the central photo over the others'", 0.2, 5.0);
-  command.add_option("--photo", args.photo, "What the world of videos and photos looks like (default: noise)")
+  add_number(command, "--zoomed", args.zoomed, "Focal length of the central photo / that of the others", 0.2, 5.0);
+  command.add_option("--photo", args.photo, "Photo used as texture of the scene in videos and photos (default: noise)")
       ->type_name("FILE");
-  add_number(command, "--photo-deg", args.photo_deg, "Angular width of that photo in the world", 1.0, 360.0);
-  add_number(command, "--noise", args.panorama.noise, "Grey noise of the frames, of 255", 0.0, 100.0);
-  add_number(command, "--blur", args.panorama.blur_px, "Optical blur of the frames [px]", 0.0, 20.0);
+  add_number(command, "--photo-deg", args.photo_deg, "Angular width of that photo in the scene [deg]", 1.0, 360.0);
+  add_number(command, "--noise", args.panorama.noise, "σ of the grey-level noise of the frames, of 255", 0.0, 100.0);
+  add_number(command, "--blur", args.panorama.blur_px, "σ of the optical blur of the frames [px]", 0.0, 20.0);
 }
 
 void add_lens_options(CLI::App& command, SimulateRotationArgs& args) {
-  add_number(command, "--k1", args.k1, "True radial distortion", -0.4, 0.4);
+  add_number(command, "--k1", args.k1, "True lens: k1", -0.4, 0.4);
   add_number(command, "--k2", args.k2, "True lens: k2", -0.4, 0.4);
   add_number(command, "--k3", args.k3, "True lens: k3", -0.4, 0.4);
   add_number(command, "--p1", args.p1, "True lens: p1", -0.05, 0.05);
@@ -348,15 +357,15 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
   add_image_options(command, args);
   add_lens_options(command, args);
   add_fault_options(command, args);
-  add_number(command, "--tilt-deg", args.tilt_deg, "Mean tilt of a head", -80.0, 80.0);
-  add_number(command, "--delay", args.delay_s, "Pixels are so much later than the rotation [s]", -0.5, 0.5);
-  add_number(command, "--duration", args.config.duration_s, "Length of the log [s]", 0.1, 100000.0);
-  add_number(command, "--rate", args.config.rate_hz, "Rows a second", 1.0, 10000.0);
-  add_number(command, "--sigma-px", args.config.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0);
-  add_number(command, "--sigma-rate", args.config.sigma_rate_rad_per_s, "Noise of a rate [rad/s]", 0.0, 1.0);
-  add_number(command, "--sigma-angle", args.config.sigma_angle_rad, "Noise of an angle [rad]", 0.0, 1.0);
-  add_number(command, "--sigma-range-m", args.config.sigma_range_m, "Noise of a range [m]", 0.0, 10.0);
-  add_number(command, "--lost", args.config.lost_share, "Share of pixels not seen", 0.0, 0.95);
+  add_number(command, "--tilt-deg", args.tilt_deg, "With --source head: mean tilt [deg]", -80.0, 80.0);
+  add_number(command, "--delay", args.delay_s, "Delay of the pixels against the rotation [s]", -0.5, 0.5);
+  add_number(command, "--duration", args.config.duration_s, "Duration of the log [s]", 0.1, 100000.0);
+  add_number(command, "--rate", args.config.rate_hz, "Rows per second", 1.0, 10000.0);
+  add_number(command, "--sigma-px", args.config.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0);
+  add_number(command, "--sigma-rate", args.config.sigma_rate_rad_per_s, "σ of a rate [rad/s]", 0.0, 1.0);
+  add_number(command, "--sigma-angle", args.config.sigma_angle_rad, "σ of an angle [rad]", 0.0, 1.0);
+  add_number(command, "--sigma-range-m", args.config.sigma_range_m, "σ of a range [m]", 0.0, 10.0);
+  add_number(command, "--lost", args.config.lost_share, "Share of missing pixels", 0.0, 0.95);
 }
 
 }  // namespace
@@ -364,7 +373,7 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
 void add_rotation_scenario(App& app) {
   auto args = std::make_shared<SimulateRotationArgs>();
   CLI::App& command = app.add_command(
-      {"simulate rotation", "Pixels of static points and the rotation of a camera that rotates, with the truth",
+      {"simulate rotation", "Pixels of static points seen by a rotating camera, its rotation, and ground truth",
        "  alidade simulate rotation --out turn && alidade observe turn/log.csv --size 780x582\n"
        "  alidade simulate rotation --source head --tilt-deg 20 --zoom ramp --k1 -0.2 --out zoom\n"
        "  alidade simulate rotation --video --source head --duration 8 --out film &&\n"

@@ -87,56 +87,58 @@ ExitCode simulate_servo(const SimulateServoArgs& args, Run& run) {
 void add_servo_scenario(App& app) {
   auto args = std::make_shared<SimulateServoArgs>();
   CLI::App& command = app.add_command(
-      {"simulate servo", "A log of one servo axis under steps or a chirp for `identify`, and a scenario for `servo`",
+      {"simulate servo", "Log of one servo axis driven by steps or a chirp, for `identify`, and a scenario for `servo`",
        "  alidade simulate servo --out sim && alidade identify sim/log.csv && alidade servo sim/scenario.yaml\n"
        "  alidade simulate servo --chirp --kind rate --latency-s 0.05 --out rate",
        true},
       [args](Run& run) { return simulate_servo(*args, run); });
-  command.add_option("--kind", args->kind, "What follows the command with a lag: the angle, or its rate")
+  command.add_option("--kind", args->kind, "Quantity that follows the command with a lag: the angle or its rate")
       ->check(CLI::IsMember({"angle", "rate"}))
       ->capture_default_str();
-  command.add_flag("--chirp", args->chirp, "A sine that rises from 0.1 to 3 Hz, instead of steps");
-  command.add_flag("--one-step", args->one_step, "One step after 0.5 s that stays, instead of several to both sides");
-  command.add_option("--gain", args->gain, "Angle (or rate) for each unit of command (default: 0.0567, rate 0.3)")
+  command.add_flag("--chirp", args->chirp, "Command a chirp from 0.1 to 3 Hz instead of steps");
+  command.add_flag("--one-step", args->one_step,
+                   "Command a single step at 0.5 s instead of several in both directions");
+  command
+      .add_option("--gain", args->gain, "Angle (or rate) per unit of command (default: 0.0567; with --kind rate 0.3)")
       ->check(finite_number());
   command.add_option("--unit", args->unit, "Unit of the angle in the gain")
       ->check(CLI::IsMember({"deg", "rad"}))
       ->capture_default_str();
-  add_number(command, "--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
-  add_number(command, "--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);
-  add_number(command, "--max-rate-deg-s", args->max_rate_deg_s, "Fastest turn [deg/s]", 1e-3, no_limit_deg_s);
+  add_number(command, "--tau-s", args->tau_s, "Time constant [s]", 1e-4, 100.0);
+  add_number(command, "--latency-s", args->latency_s, "Latency from a command to its first effect [s]", 0.0, 10.0);
+  add_number(command, "--max-rate-deg-s", args->max_rate_deg_s, "Maximum rate [deg/s]", 1e-3, no_limit_deg_s);
   add_number(command, "--max-acceleration-deg-s2", args->max_acceleration_deg_s2,
-             "With --kind rate: largest acceleration [deg/s2]", 1e-3, 1e9);
+             "With --kind rate: maximum acceleration [deg/s2]", 1e-3, 1e9);
   add_number(command, "--dead-band", args->dead_band,
-             "Commands no larger do nothing, larger ones count from it [units of command]", 0.0, 1e9);
-  add_number(command, "--max-command", args->max_command, "Larger commands act as it [units of command]; 0: none do",
-             0.0, 1e9);
+             "Dead band: smaller commands do nothing, larger ones are reduced by it [units of command]", 0.0, 1e9);
+  add_number(command, "--max-command", args->max_command, "Saturation of the command [units of command]; 0: none", 0.0,
+             1e9);
   add_number(command, "--rate-offset-deg-s", args->rate_offset_deg_s,
-             "It turns by so much beside what it is commanded, as of a neutral that is off [deg/s]", -90.0, 90.0);
+             "Rate in addition to the commanded rate, for example from a misadjusted neutral [deg/s]", -90.0, 90.0);
   add_number(command, "--soft-max-rate-deg-s", args->soft_max_rate_deg_s,
-             "A rate r of the lag, or of a command, becomes r / (1 + r / this), as of a motor whose force falls with "
-             "its rate; 0: "
-             "no such thing [deg/s]",
+             "Soft rate limit: a rate r becomes r / (1 + r / limit), as of a motor whose torque falls with speed; 0: "
+             "none [deg/s]",
              0.0, 1e6);
   add_number(command, "--backlash-deg", args->backlash_deg,
-             "Play between what drives the axis and the angle that is read", 0.0, 90.0);
-  add_number(command, "--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);
+             "Backlash between the drive and the angle that is read [deg]", 0.0, 90.0);
+  add_number(command, "--second-tau-s", args->second_tau_s, "Time constant of a second lag, on the command [s]", 0.0,
+             100.0);
   add_number(command, "--resonance-hz", args->resonance.hz,
-             "Natural frequency of what swings behind the drive; 0: nothing does", 0.0, 1000.0);
-  add_number(command, "--resonance-damping", args->resonance.damping, "Its damping ratio", 1e-3, 0.9);
+             "Natural frequency of a resonance behind the drive [Hz]; 0: none", 0.0, 1000.0);
+  add_number(command, "--resonance-damping", args->resonance.damping, "Damping ratio of the resonance", 1e-3, 0.9);
   add_number(command, "--resonance-share", args->resonance.share,
-             "Of the motion, the part that goes through it; the rest is rigid", -10.0, 10.0);
-  add_number(command, "--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
-  add_number(command, "--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
-  add_number(command, "--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);
+             "Share of the motion that passes through the resonance; the rest is rigid", -10.0, 10.0);
+  add_number(command, "--amplitude", args->amplitude, "Amplitude of the steps or chirp, in units of command", 0.0, 1e9);
+  add_number(command, "--duration-s", args->duration_s, "Duration of the log [s]", 1e-3, 1e4);
+  add_number(command, "--rate-hz", args->rate_hz, "Rows per second", 1e-2, 1e5);
   command
       .add_option("--commands-per-row", args->commands_per_row,
-                  "Commands from row to row, as of a controller that is faster than its log (with --chirp)")
+                  "Commands per row, as of a controller faster than its log (with --chirp)")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
-  add_number(command, "--sigma-deg", args->sigma_deg, "Noise of the encoder", 0.0, 90.0);
-  add_number(command, "--step-deg", args->step_deg, "One count of the encoder; 0: it does not round", 0.0, 90.0);
-  add_number(command, "--zero-deg", args->zero_deg, "What the encoder reads at angle zero", -360.0, 360.0);
+  add_number(command, "--sigma-deg", args->sigma_deg, "σ of the encoder [deg]", 0.0, 90.0);
+  add_number(command, "--step-deg", args->step_deg, "Resolution of the encoder [deg]; 0: no rounding", 0.0, 90.0);
+  add_number(command, "--zero-deg", args->zero_deg, "Encoder reading at angle zero [deg]", -360.0, 360.0);
 }
 
 }  // namespace alidade::cli

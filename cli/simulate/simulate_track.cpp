@@ -60,11 +60,11 @@ void follow_record(const std::string& file, TrackScene& scene) {
 }
 
 const char* const fault_help =
-    "What is not as rig.yaml says, NAME or NAME:SIZE; of head 2 unless named: yaw, pitch, roll (of its base, rad), "
-    "baseline (share of it), pan_zero1, pan_zero2, tilt_zero1, tilt_zero2 (rad), clock (s), time_step (of all heads' "
-    "times, rounded down, s), clutter (share of the "
-    "observations), second_target (share of the observations), swapped, mirrored, mirrored_all (of all heads), "
-    "pan_sign, tilt_sign, milliseconds (all times), milliseconds2; rig.yaml then does not call itself exact";
+    "Deviation from rig.yaml, NAME or NAME:SIZE; of head 2 unless named: yaw, pitch, roll (of its base, rad), baseline "
+    "(relative), pan_zero1, pan_zero2, tilt_zero1, tilt_zero2 (rad), clock (s), time_step (times of all heads rounded "
+    "down to it, s), clutter (share of the observations), second_target (share of the observations), swapped (heads), "
+    "mirrored, mirrored_all (all heads), pan_sign, tilt_sign, milliseconds (all times in ms), milliseconds2 (those of "
+    "head 2); rig.yaml is then not marked exact";
 
 std::optional<double> number_of(const std::string& text) {
   double value = 0.0;
@@ -216,7 +216,7 @@ ExitCode simulate_track_events(const SimulateTrackArgs& args, Run& run) {
 void add_track_scenario(App& app) {
   auto args = std::make_shared<SimulateTrackArgs>();
   CLI::App& command = app.add_command(
-      {"simulate track", "What two pan-tilt heads see of a moving target, and its true path",
+      {"simulate track", "Observations of a moving target by two pan-tilt heads, and its true path",
        "  alidade simulate track --scenario C --out sim && alidade track sim/events.csv --rig sim/rig.yaml \\\n"
        "    --truth sim/truth.csv\n"
        "  alidade simulate track --scenario B --latency-ms 100 --out late\n"
@@ -227,26 +227,28 @@ void add_track_scenario(App& app) {
        true},
       [args](Run& run) { return simulate_track_events(*args, run); });
   command
-      .add_option(
-          "--scenario", args->scenario,
-          "A slow circle; A2 the same, heads with offsets and turned mountings; B fast circle; C manoeuvre; D C, "
-          "hidden for a while; E B, images 100 ms late; F C, 100 ms late; G C, 20 and 30 images a second; "
-          "throw a ball thrown up and caught; bounce a ball that bounces")
+      .add_option("--scenario", args->scenario,
+                  "A: slow circle; A2: likewise, heads with offsets and rotated mountings; B: fast circle; C: "
+                  "manoeuvre; D: C, hidden for a while; E: B, images 100 ms late; F: C, images 100 ms late; G: C, 20 "
+                  "and 30 images per second; throw: ball thrown up and caught; bounce: bouncing ball")
       ->capture_default_str();
   command.add_option("--path", args->path,
-                     "Path of the target instead, from the first row on: t_s,x_m,y_m,z_m; after the last it rests");
+                     "Target path to use instead of the scenario's, CSV from its first row: t_s,x_m,y_m,z_m; after the "
+                     "last row the target rests");
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(number_within(low, high));
   };
-  command.add_flag("--video", args->video, "Render frames instead of observations: head_1/, head_2/, angles.csv");
-  number("--clutter", args->clutter, "With --video: coloured patches behind the target, σ of a colour, of 255", 0.0,
-         100.0);
-  number("--duration", args->duration_s, "Seconds (default: the scenario's, or the path's)", 0.1, longest_s);
-  number("--latency-ms", args->latency_ms, "Capture to arrival (default: the scenario's)", 0.0, 10000.0);
-  number("--lag-s", args->lag_s, "Time constant of the heads (default: 0.34; of the throw 0.05)", 0.0, 10.0);
+  command.add_flag("--video", args->video,
+                   "Render frames instead of observations; writes head_1/, head_2/ and angles.csv");
+  number("--clutter", args->clutter,
+         "With --video: contrast of coloured patches behind the target, σ of a colour value, of 255", 0.0, 100.0);
+  number("--duration", args->duration_s, "Duration [s] (default: the scenario's, or the path's)", 0.1, longest_s);
+  number("--latency-ms", args->latency_ms, "Latency from capture to arrival [ms] (default: the scenario's)", 0.0,
+         10000.0);
+  number("--lag-s", args->lag_s, "Time constant of the heads [s] (default: 0.34; scenario throw: 0.05)", 0.0, 10.0);
   command.add_option("--fault", args->faults, fault_help)->type_name("NAME:SIZE");
-  number("--sigma-px", args->sigma_px, "Noise of the target's pixel", 0.0, 100.0)->capture_default_str();
-  number("--sigma-angle", args->sigma_angle, "Noise of an encoder [rad]", 0.0, 1.0)->capture_default_str();
+  number("--sigma-px", args->sigma_px, "σ of the target's pixel coordinates [px]", 0.0, 100.0)->capture_default_str();
+  number("--sigma-angle", args->sigma_angle, "σ of an encoder reading [rad]", 0.0, 1.0)->capture_default_str();
 }
 
 }  // namespace alidade::cli

@@ -142,31 +142,31 @@ ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
 /// What is not as given.
 void add_mistakes(CLI::App& command, SimulateUnderwaterArgs& args, CLI::Option* video) {
   UnderwaterScene& scene = args.scene;
-  const char* const group = "What is not as given";
-  add_number(command, "--told-f", args.given_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)
+  const char* const group = "Simulated faults";
+  add_number(command, "--told-f", args.given_f, "Focal length in camera.yaml / true focal length", 0.1, 10.0)
       ->group(group);
-  add_number(command, "--told-centre", args.given_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
+  add_number(command, "--told-centre", args.given_centre_px, "cx in camera.yaml minus the true one [px]", -500.0, 500.0)
       ->group(group);
-  command.add_flag("!--no-k1", args.given_k1, "camera.yaml has no k1")->group(group);
+  command.add_flag("!--no-k1", args.given_k1, "Omit k1 from camera.yaml")->group(group);
   add_number(command, "--readout", scene.readout_s, "Rolling shutter: time from the first row to the last [s]", 0.0,
              1.0)
       ->excludes(video)
       ->group(group);
-  add_number(command, "--late", scene.late_s, "Images are taken so long before their times [s]", -10.0, 10.0)
+  add_number(command, "--late", scene.late_s, "Images are taken this long before their timestamps [s]", -10.0, 10.0)
       ->excludes(video)
       ->group(group);
   command
       .add_option("--missing-every", scene.missing_every,
-                  "Of so many frames the last is missing, and those behind it are numbered through (0: none)")
+                  "Drop every N-th frame and number the others consecutively; 0: none")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str()
       ->group(group);
   add_number(command, "--target-speed", scene.target_speed_m_s,
-             "Of the board along its x, against the other points [m/s]", -1.0, 1.0)
+             "Speed of the board along its x axis against the other points [m/s]", -1.0, 1.0)
       ->excludes(video)
       ->group(group);
-  add_number(command, "--target-stretch", scene.target_stretch,
-             "target.yaml's points are so much further apart along x", -0.5, 0.5)
+  add_number(command, "--target-stretch", scene.target_stretch, "Relative stretch of the points in target.yaml along x",
+             -0.5, 0.5)
       ->excludes(video)
       ->group(group);
 }
@@ -174,23 +174,23 @@ void add_mistakes(CLI::App& command, SimulateUnderwaterArgs& args, CLI::Option* 
 /// What is seen, and how well.
 CLI::Option* add_scene(CLI::App& command, SimulateUnderwaterArgs& args) {
   UnderwaterScene& scene = args.scene;
-  command.add_option("--camera", args.camera, "The camera (default: a strongly distorting one)")->type_name("FILE");
-  command.add_option("--frames", scene.num_frames, "How many frames")
+  command.add_option("--camera", args.camera, "True camera (default: one with strong distortion)")->type_name("FILE");
+  command.add_option("--frames", scene.num_frames, "Number of frames")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  CLI::Option* points = command.add_option("--points", scene.num_points, "The board's 8, then others")
-                            ->check(CLI::Range(1, 1000))
-                            ->capture_default_str();
-  command.add_option("--rate", args.rate_hz, "Frames per second")->check(positive_number())->capture_default_str();
-  CLI::Option* video =
-      command.add_flag("--video", args.video,
-                       "Render images of the board instead of observations: frames/, as seen through turbid water");
-  add_number(command, "--blur-px", args.look.blur_px, "With --video: sigma of the blur [px]", 0.0, 10.0)->needs(video);
-  add_number(command, "--noise", args.look.noise, "With --video: sigma of a colour value's noise, of 255", 0.0, 100.0)
+  CLI::Option* points =
+      command.add_option("--points", scene.num_points, "Number of points: the board's 8, then others")
+          ->check(CLI::Range(1, 1000))
+          ->capture_default_str();
+  command.add_option("--rate", args.rate_hz, "Frame rate [Hz]")->check(positive_number())->capture_default_str();
+  CLI::Option* video = command.add_flag(
+      "--video", args.video, "Render images of the board through turbid water instead of observations; writes frames/");
+  add_number(command, "--blur-px", args.look.blur_px, "With --video: σ of the blur [px]", 0.0, 10.0)->needs(video);
+  add_number(command, "--noise", args.look.noise, "With --video: σ of the noise of a colour value, of 255", 0.0, 100.0)
       ->needs(video);
   points->excludes(video);
   add_number(command, "--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
-  add_number(command, "--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
+  add_number(command, "--sigma-depth", scene.sigma_depth, "Relative σ of the depths in start.yaml", 0.0, 1.0)
       ->excludes(video);
   return video;
 }
@@ -200,7 +200,7 @@ CLI::Option* add_scene(CLI::App& command, SimulateUnderwaterArgs& args) {
 void add_underwater_scenario(App& app) {
   auto args = std::make_shared<SimulateUnderwaterArgs>();
   CLI::App& command = app.add_command(
-      {"simulate underwater", "What a camera under water sees of a board and points around it, and its true path",
+      {"simulate underwater", "Observations of a board and points around it by an underwater camera, and its true path",
        "  alidade simulate underwater --out sim && alidade localize sim/sights.csv --camera sim/camera.yaml \\\n"
        "    --target sim/target.yaml --start sim/start.yaml --truth sim/truth.tum\n"
        "  alidade simulate underwater --points 40 --frames 300 --rate 30 --mismatches 0.4 --out hard\n"
@@ -211,13 +211,16 @@ void add_underwater_scenario(App& app) {
   UnderwaterScene& scene = args->scene;
   CLI::Option* video = add_scene(command, *args);
   add_number(command, "--imu", args->imu_hz,
-             "An IMU beside the camera, so many readings a second: imu.csv, its mounting imu.yaml", 10.0, 10000.0);
-  add_number(command, "--imu-late", args->imu.late_s, "Its clock less the camera's [s]", -10.0, 10.0);
-  add_number(command, "--mismatches", scene.mismatches, "Share of the observations that show another point", 0.0, 1.0)
+             "Rate of an IMU beside the camera [Hz]; writes imu.csv and its mounting imu.yaml; 0: none", 10.0, 10000.0);
+  add_number(command, "--imu-late", args->imu.late_s, "Clock offset of the IMU: its time minus the camera's [s]", -10.0,
+             10.0);
+  add_number(command, "--mismatches", scene.mismatches, "Share of the observations that belong to another point", 0.0,
+             1.0)
       ->excludes(video);
-  add_number(command, "--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)
+  add_number(command, "--blackout-from", scene.blackout_from_s, "Start of a time in which nothing is seen [s]", 0.0,
+             1e6)
       ->excludes(video);
-  add_number(command, "--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
+  add_number(command, "--blackout", scene.blackout_s, "Duration of that time [s]", 0.0, 1e6)->excludes(video);
   add_mistakes(command, *args, video);
 }
 

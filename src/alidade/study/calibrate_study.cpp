@@ -106,26 +106,32 @@ State state_of(CalibrateReport::Status status) {
 
 FieldList fields_of(CalibrateStudy& study) {
   static const std::vector<std::string> models{"pinhole", "brown", "kannala_brandt"};
-  return {{.name = "photos", .value = &study.photos, .help = "Of a 9x6 board, 640x480", .limits = {3, 1000}},
-          {.name = "noise_px", .value = &study.noise_px, .help = "σ of a corner's coordinate", .limits = {1e-6, 100.0}},
+  return {{.name = "photos",
+           .value = &study.photos,
+           .help = "Number of photos, 640x480, of a 9x6 board",
+           .limits = {3, 1000}},
+          {.name = "noise_px",
+           .value = &study.noise_px,
+           .help = "σ of a corner's coordinate [px]",
+           .limits = {1e-6, 100.0}},
           {.name = "shared_px",
            .value = &study.shared_px,
-           .help = "σ of each term of a smooth field of errors that a photo's corners share",
+           .help = "σ of each term of a smooth error field shared by the corners of a photo [px]",
            .limits = {0.0, 100.0}},
-          {.name = "model", .value = one_of(study.model, models), .help = "Of the lens"},
+          {.name = "model", .value = one_of(study.model, models), .help = "Lens model"},
           {.name = "board_shape",
            .value = words_code(study.board_shape, shape_words()),
-           .help = "As it is estimated, though the simulated board is flat"},
+           .help = "Board shape as estimated; the simulated board is flat"},
           {.name = "scenes",
            .value = &study.scenes,
-           .help = "Sets of poses, which trials take one after the other; 0: each trial its own",
+           .help = "Number of pose sets, used by the trials in turn; 0: each trial its own",
            .limits = {0, 10000}},
           {.name = "sigma_map",
            .value = &study.sigma_map,
-           .help = "Also the error of the sigma map at 5 x 4 pixels, after the implied rotation"},
+           .help = "Also the error of the σ map at 5 x 4 pixels, after the implied rotation"},
           {.name = "judge",
            .value = &study.judge,
-           .help = "The whole job with its verdict, not the solve alone: some times slower"}};
+           .help = "Run the whole command with its verdict, not the solver alone; several times slower"}};
 }
 
 StudySetting setting_of(const CalibrateStudy& study, std::uint64_t seed) {

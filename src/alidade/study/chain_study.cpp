@@ -11,10 +11,13 @@ namespace alidade {
 FieldList fields_of(ChainStudy& study) {
   return {{.name = "range_m",
            .value = &study.range_m,
-           .help = "Of the target; the heads stand 0.5 m apart",
+           .help = "Range of the target [m]; the heads are 0.5 m apart",
            .limits = {0.5, 50.0}},
-          {.name = "photos", .value = &study.photos, .help = "Of a 9x6 board, of each camera", .limits = {8, 200}},
-          {.name = "exact", .value = &study.exact, .help = "The track takes rig and lenses as exact"}};
+          {.name = "photos",
+           .value = &study.photos,
+           .help = "Number of photos of a 9x6 board, per camera",
+           .limits = {8, 200}},
+          {.name = "exact", .value = &study.exact, .help = "Tracking treats rig and lenses as exact"}};
 }
 
 std::optional<TrackTrial> trial_of(const ChainStudy& study, std::uint64_t seed, std::uint64_t number) {

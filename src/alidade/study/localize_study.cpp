@@ -7,16 +7,17 @@
 namespace alidade {
 
 FieldList fields_of(LocalizeStudy& study) {
-  return {{.name = "points",
-           .value = &study.points,
-           .help = "The board's 8, four of them known, then others",
-           .limits = {8, 200}},
-          {.name = "frames", .value = &study.frames, .help = "At 10 Hz", .limits = {3, 10000}},
-          {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate", .limits = {1e-6, 100.0}},
-          {.name = "depth_sigma",
-           .value = &study.depth_sigma,
-           .help = "σ of what is believed of an unknown point's depth, relative",
-           .limits = {1e-6, 1.0}}};
+  return {
+      {.name = "points",
+       .value = &study.points,
+       .help = "Number of points: the board's 8, four of them known, then others",
+       .limits = {8, 200}},
+      {.name = "frames", .value = &study.frames, .help = "Number of frames, at 10 Hz", .limits = {3, 10000}},
+      {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate [px]", .limits = {1e-6, 100.0}},
+      {.name = "depth_sigma",
+       .value = &study.depth_sigma,
+       .help = "Relative σ of the initial depth of an unknown point",
+       .limits = {1e-6, 1.0}}};
 }
 
 LocalizeTrial trial_of(const LocalizeStudy& study, std::uint64_t seed, std::uint64_t number) {

@@ -119,17 +119,18 @@ RunTrial whole_worker(const ObserveStudy& study, std::uint64_t seed, std::shared
 
 FieldList fields_of(ObserveStudy& study) {
   static const std::vector<std::string> methods{"batch", "hybrid", "window", "flow", "fang2011"};
-  return {{.name = "method",
-           .value = one_of(study.method, methods),
-           .help = "batch: all rows adjusted together, fast; hybrid, window, flow, fang2011: observe, the whole job"},
-          {.name = "rows", .value = &study.rows, .help = "Of a log", .limits = {10, 100000}},
-          {.name = "rate_hz", .value = &study.rate_hz, .help = "Rows a second", .limits = {1.0, 10000.0}},
-          {.name = "points", .value = &study.points, .help = "Static points", .limits = {2, 5000}},
-          {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate", .limits = {1e-6, 100.0}},
-          {.name = "scenes",
-           .value = &study.scenes,
-           .help = "Sets of points, which trials take one after the other",
-           .limits = {1, 10000}}};
+  return {
+      {.name = "method",
+       .value = one_of(study.method, methods),
+       .help = "batch: one adjustment of all rows, fast; hybrid, window, flow, fang2011: the whole observe command"},
+      {.name = "rows", .value = &study.rows, .help = "Rows per log", .limits = {10, 100000}},
+      {.name = "rate_hz", .value = &study.rate_hz, .help = "Rows per second", .limits = {1.0, 10000.0}},
+      {.name = "points", .value = &study.points, .help = "Number of static points", .limits = {2, 5000}},
+      {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate [px]", .limits = {1e-6, 100.0}},
+      {.name = "scenes",
+       .value = &study.scenes,
+       .help = "Number of point sets, used by the trials in turn",
+       .limits = {1, 10000}}};
 }
 
 StudySetting setting_of(const ObserveStudy& study, std::uint64_t seed) {

@@ -33,16 +33,18 @@ void fill(const RangefinderReport& report, State state, const Beam& truth, Trial
 FieldList fields_of(RangefinderStudy& study) {
   static const std::vector<std::string> methods{"spot", "plane", "joint"}, refines{"all", "beam"};
   return {
-      {.name = "scenario", .value = one_of(study.scenario, rangefinder_scenarios()), .help = "Of simulate rangefinder"},
+      {.name = "scenario",
+       .value = one_of(study.scenario, rangefinder_scenarios()),
+       .help = "Scenario of simulate rangefinder"},
       {.name = "method", .value = one_of(study.method, methods), .help = "spot, plane or joint"},
       {.name = "refine",
        .value = one_of(study.refine, refines),
-       .help = "all: lens, boards and beam together; beam: lens and boards fixed"},
-      {.name = "shots", .value = &study.shots, .help = "Of a log", .limits = {3, 1000}},
-      {.name = "noise_px", .value = &study.noise_px, .help = "σ of the spot's coordinate", .limits = {1e-6, 100.0}},
+       .help = "all: refine lens, boards and beam jointly; beam: lens and boards fixed"},
+      {.name = "shots", .value = &study.shots, .help = "Shots per log", .limits = {3, 1000}},
+      {.name = "noise_px", .value = &study.noise_px, .help = "σ of a spot's coordinate [px]", .limits = {1e-6, 100.0}},
       {.name = "corner_noise_px",
        .value = &study.corner_noise_px,
-       .help = "σ of a corner's coordinate",
+       .help = "σ of a corner's coordinate [px]",
        .limits = {1e-6, 100.0}},
       {.name = "noise_m",
        .value = &study.noise_m,
@@ -51,7 +53,7 @@ FieldList fields_of(RangefinderStudy& study) {
        .option = "--range-noise"},
       {.name = "judge",
        .value = &study.judge,
-       .help = "The whole job with its verdict, not the solve alone: some times slower"}};
+       .help = "Run the whole command with its verdict, not the solver alone; several times slower"}};
 }
 
 RangefinderTrial trial_of(const RangefinderStudy& study, std::uint64_t seed, std::uint64_t number) {

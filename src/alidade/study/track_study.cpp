@@ -49,15 +49,16 @@ void take_end_of_track(const TrackTrial& trial, TrialResult& result) {
 
 FieldList fields_of(TrackStudy& study) {
   static const std::vector<std::string> methods{"cv", "singer", "turn", "imm"};
-  return {{.name = "scenario", .value = one_of(study.scenario, track_scenarios()), .help = "Of simulate track"},
-          {.name = "method", .value = one_of(study.method, methods), .help = "How the target is taken to move"},
-          {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate", .limits = {1e-6, 100.0}},
-          {.name = "noise_rad",
-           .value = &study.noise_rad,
-           .help = "σ of an encoder [rad]",
-           .limits = {1e-9, 1.0},
-           .option = "--encoder-noise"},
-          {.name = "duration_s", .value = &study.duration_s, .help = "Of a track [s]", .limits = {0.5, 3600.0}}};
+  return {
+      {.name = "scenario", .value = one_of(study.scenario, track_scenarios()), .help = "Scenario of simulate track"},
+      {.name = "method", .value = one_of(study.method, methods), .help = "Motion model of the target"},
+      {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate [px]", .limits = {1e-6, 100.0}},
+      {.name = "noise_rad",
+       .value = &study.noise_rad,
+       .help = "σ of an encoder [rad]",
+       .limits = {1e-9, 1.0},
+       .option = "--encoder-noise"},
+      {.name = "duration_s", .value = &study.duration_s, .help = "Duration of a track [s]", .limits = {0.5, 3600.0}}};
 }
 
 TrackTrial trial_of(const TrackStudy& study, std::uint64_t seed, std::uint64_t number) {

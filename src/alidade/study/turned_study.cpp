@@ -39,29 +39,29 @@ TurnedScene scene_of(const TurnedStudy& study, std::uint64_t seed) {
 }  // namespace
 
 FieldList fields_of(TurnedStudy& study) {
-  return {{.name = "wrong_matches",
-           .value = &study.wrong_matches,
-           .help = "Share of the matches that are with any other point",
-           .limits = {0.0, 0.9}},
-          {.name = "moving_points",
-           .value = &study.moving_points,
-           .help = "Share of the points that each photo sees elsewhere",
-           .limits = {0.0, 0.9}},
-          {.name = "lever_m",
-           .value = &study.lever_m,
-           .help = "Camera centre from the centre of the rotation, along the view; points at 2 to 20 m",
-           .limits = {-1.0, 1.0}},
-          {.name = "step_m",
-           .value = &study.step_m,
-           .help = "Sigma of the hand's own steps from photo to photo",
-           .limits = {0.0, 1.0}},
-          {.name = "focus",
-           .value = &study.focus,
-           .help = "By which the focal length walks from photo to photo, relative",
-           .limits = {0.0, 0.1}},
-          {.name = "on_the_spot",
-           .value = &study.on_the_spot,
-           .help = "The centre is given as at rest: --sigma-parallax 0"}};
+  return {
+      {.name = "wrong_matches",
+       .value = &study.wrong_matches,
+       .help = "Share of the matches with a random other point",
+       .limits = {0.0, 0.9}},
+      {.name = "moving_points",
+       .value = &study.moving_points,
+       .help = "Share of the points that move between photos",
+       .limits = {0.0, 0.9}},
+      {.name = "lever_m",
+       .value = &study.lever_m,
+       .help =
+           "Offset of the camera centre from the centre of rotation, along the optical axis [m]; points at 2 to 20 m",
+       .limits = {-1.0, 1.0}},
+      {.name = "step_m",
+       .value = &study.step_m,
+       .help = "σ of the movement of the hand from photo to photo [m]",
+       .limits = {0.0, 1.0}},
+      {.name = "focus",
+       .value = &study.focus,
+       .help = "Relative variation of the focal length from photo to photo",
+       .limits = {0.0, 0.1}},
+      {.name = "on_the_spot", .value = &study.on_the_spot, .help = "Camera centre given as fixed: --sigma-parallax 0"}};
 }
 
 TurnedTrial trial_of(const TurnedStudy& study, std::uint64_t seed, std::uint64_t number) {

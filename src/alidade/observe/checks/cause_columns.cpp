@@ -11,7 +11,7 @@ namespace alidade {
 namespace {
 
 constexpr int max_lever_points = 16, max_across_points = 8;
-constexpr int num_waves = 6;  // half waves over the log: slower ones than that leave no rest to learn the points in
+constexpr int num_waves = 6;  // half waves over the log: more of them leave too little to estimate the points from
 constexpr double usual_wave = 0.005;
 constexpr double usual_k = 0.3, usual_p = 0.01, usual_mount_rad = 0.2, usual_delay_s = 0.1, usual_shutter_s = 0.03,
                  usual_zoom_per_s = 0.01, usual_parallax_rad = 0.05, usual_step_rad = 0.02;

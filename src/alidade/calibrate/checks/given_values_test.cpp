@@ -38,7 +38,7 @@ bool has_check(const Verdict& verdict, const std::string& name) {
 }
 
 TEST(GivenValues, APriorThatThePhotosContradictIsNamedAndCounted) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
     CalibrateConfig config;
     config.priors = {{"fx", true_value("fx") + 4.0, 0.2}, {"fy", true_value("fy") + 4.0, 0.2}};
     for (const std::vector<std::string>& fixed : {std::vector<std::string>{"skew"}, std::vector<std::string>{}}) {

@@ -149,7 +149,7 @@ Check image_check(const Camera& camera, const std::vector<ProjectedReading>& pro
 /// Nearer than the beam enters the image nothing is wrong with it. `nearest_m`: of the readings.
 std::string remedy_of_image(const Beam& beam, const Camera& camera, double nearest_m) {
   const std::string otherwise = "check origin, direction and camera of the beam";
-  for (double range_m = nearest_m; range_m < 100.0; range_m *= 1.02)
+  for (double range_m = std::max(nearest_m, 1e-6); range_m < 100.0; range_m *= 1.02)  // of 5e-324 it would not grow
     if (const auto seen = measured_pixel(beam, camera, range_m); seen && is_in_image(camera, seen->px))
       return range_m > nearest_m ? fmt::format("the beam is in the image from {:.2g} m on", range_m) : otherwise;
   return otherwise;

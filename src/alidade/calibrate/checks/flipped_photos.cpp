@@ -128,12 +128,12 @@ bool all_from_the_front(const CalibrateReport& report) {
   });
 }
 
-/// Several photos that were flipped alike: where photos disagree, and hardly do once these are as they were.
+/// Several photos that were flipped alike: where photos disagree, and no more than by chance once these are as they
+/// were, or by `share_left` of what they did: a centre that jumps across the image's leaves some of it.
 std::optional<FlippedSet> flipped_set(const Board& board, std::span<const BoardView> used,
                                       std::span<const ViewScore> scores, CalibrateConfig config,
-                                      const CalibrateReport& report) {
-  // A centre that scatters evenly about the image's, folded over it, still has a quarter of its variance.
-  constexpr double disagree = 3.0, chance = 0.5, share_left = 0.1;
+                                      const CalibrateReport& report, double share_left) {
+  constexpr double disagree = 3.0, chance = 0.5;
   constexpr std::size_t fewest = 8;
   const double beyond = report.clusters.design_effect - 1.0;
   if (used.size() < fewest || scores.size() != used.size() || beyond < disagree) return std::nullopt;
@@ -166,7 +166,7 @@ void take(CalibrateReport without, std::vector<BoardView> others, const Flip& fl
 void reject_flipped_set(const Board& board, const CalibrateConfig& config, std::vector<BoardView>& views,
                         CalibrateReport& report) {
   const std::vector<BoardView> used = used_views(views, report, views.size());
-  const auto set = flipped_set(board, used, view_scores(board, config, views, report), config, report);
+  const auto set = flipped_set(board, used, view_scores(board, config, views, report), config, report, 0.0);
   if (!set) return;
   std::vector<BoardView> others = views;
   for (std::size_t k = 0, at = 0; k < views.size(); ++k)
@@ -205,7 +205,8 @@ std::optional<Check> kept_flips(const Board& board, const CalibrateConfig& confi
                                 const CalibrateReport& report) {
   if (!is_central(report.camera.lens) || config.outliers != OutlierRule::keep) return std::nullopt;
   const std::vector<BoardView> used = used_views(views, report, views.size());
-  const auto set = flipped_set(board, used, view_scores(board, config, views, report), config, report);
+  // Their noise is not known: photos that still disagree a little are of no trusted lens either way.
+  const auto set = flipped_set(board, used, view_scores(board, config, views, report), config, report, 0.1);
   if (!set) return std::nullopt;
   constexpr int named = 4;
   int num = 0;
@@ -230,7 +231,7 @@ void heed_kept_flips(const Check& check, Verdict& verdict) {
 }
 
 void heed_flipped_photos(const CalibrateReport& report, Verdict& verdict) {
-  constexpr double few = 0.25;
+  constexpr double few = 0.25, single = 1.0;
   double num_used = 0.0, num_flipped = 0.0;
   const Flip* how = nullptr;
   for (const ViewFit& view : report.views) {
@@ -242,12 +243,14 @@ void heed_flipped_photos(const CalibrateReport& report, Verdict& verdict) {
     how = flip;
   }
   const double share = num_flipped / std::max(1.0, num_used + num_flipped);
-  if (!(share > few)) return;
+  if (!(share > few || num_flipped > single)) return;  // a centre that jumped to its mirror image looks the same
   Check check{.name = "one orientation", .state = State::care, .value = 100.0 * share, .limit = 100.0 * few};
   check.unit = "%";
   check.figure = "photos";
-  check.text = text_of(num_flipped, 4) + " of " + text_of(num_used + num_flipped, 4) + " photos are " + how->words +
-               " against the others, of which the stated lens is: that it is theirs, only their number says";
+  check.text =
+      text_of(num_flipped, 4) + " of " + text_of(num_used + num_flipped, 4) + " photos are " + how->words +
+      " against the others, of which the stated lens is: that it is theirs, only their number says; a centre that " +
+      "jumped to the other side of the image's would show the same";
   const bool was_good = verdict.state == State::good;
   heed(check, take_as_stored, verdict);
   if (!was_good) verdict.sentence += "; " + check.text;

@@ -113,6 +113,19 @@ TEST(FlippedPhotos, AreNotSeenInACentreThatMoves) {
   for (const ViewFit& view : result.views) EXPECT_TRUE(view.used) << view.reason;
 }
 
+/// A centre that jumps across the image's is a jump, or at least never good: only an exact mirror image is a flip.
+TEST(FlippedPhotos, AreNotGoodWhereACentreJumps) {
+  for (const double jump_px : {-9.0, -12.0, -14.0, -16.0}) {
+    constexpr std::uint64_t seed = 1;
+    const Camera camera = testing::sample_camera("brown", {{"cx", 324.3}});
+    const BoardScene scene = testing::covered_scene(camera, 24, seed);
+    std::vector<BoardView> views = testing::sample_views(scene, seed);
+    for (std::size_t k = 19; k < views.size(); ++k)
+      for (Corner& corner : views[k].corners) corner.px.x() += jump_px;
+    EXPECT_NE(testing::sample_calibration(views).verdict.state, State::good) << jump_px;
+  }
+}
+
 /// Corners that are wrong for another reason are no flipped image's.
 TEST(FlippedPhotos, AreNotSeenInCornersOfAnotherBoard) {
   constexpr std::uint64_t seed = 3;

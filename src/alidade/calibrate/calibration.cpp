@@ -199,8 +199,9 @@ void give_verdict(const std::optional<Check>& flips, const std::optional<GivenVa
                   const std::vector<ViewScore>& scores, const OrderTaken& taken, Calibration& result) {
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
   heed_flipped_photos(result, result.verdict);
-  if (given) heed_given_values(*given, result.verdict);
+  if (given && given->photos_agree) heed_given_values(*given, result.verdict);
   heed_changes(std::move(change), flips, scores, taken, result);
+  if (given && !given->photos_agree) heed_given_values(*given, result.verdict);
   if (const auto rival = rival_model(result.board, result.board_views, result.config, result))
     heed_rival_model(*rival, result.verdict);
   heed_assumptions(result.assumed, result.verdict);
@@ -236,7 +237,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   if (auto row = not_tested(errors.unseen, result)) result.assumed.push_back(std::move(*row));
   const OrderTaken taken = order_taken(result);
   LensChangeStudy change = find_change(scores, taken, result);
-  if (given && given->contradict) change.change.reset();  // photos that are fitted to a wrong value differ
+  if (given && given->contradict && given->photos_agree) change.change.reset();  // it is of the wrong value
   if (change.change) count_change(*change.change, result);
   result.study = study_calibration(board, result.board_views, result.config, result,
                                    max_informative(transfers, result.config.board_shape), progress);

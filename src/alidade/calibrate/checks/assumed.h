@@ -42,6 +42,7 @@ struct GivenValue {
 struct GivenValues {
   std::vector<GivenValue> values;  ///< That which is farthest off first.
   bool contradict = false;         ///< Proved.
+  bool photos_agree = true;        ///< Without the given values; else something else is wrong, which goes first.
   Eigen::MatrixXd cov;             ///< To be added to the stated one: what of the difference is beyond chance.
 };
 

@@ -80,6 +80,8 @@ std::optional<GivenValues> test_given_values(const Board& board, std::span<const
   }
   std::ranges::sort(given.values, std::greater{}, &GivenValue::apart);
   constexpr double proved = 4.0, chance = 2.5;  // of the farthest of a few
+  constexpr double disagree = 1.7;              // clean photos have 0.7 to 1.3, those of an autofocus from 1.9 on
+  given.photos_agree = alone.clusters.design_effect < disagree;
   const double apart = given.values.front().apart();
   given.contradict = apart > proved;
   const double counted = given.contradict ? 1.0 : std::max(0.0, 1.0 - chance * chance / (apart * apart));
@@ -98,12 +100,13 @@ void heed_given_values(const GivenValues& given, Verdict& verdict) {
   check.text = text_of_given(worst) + ", and by the photos alone it is " + text_of(worst.by_photos, 5) + " ± " +
                text_of(3.0 * worst.sigma_by_photos, 2) + " (" + text_of(worst.apart(), 2) +
                "σ apart): σ includes the difference";
-  const std::string remedy = worst.sigma > 0.0 ? "correct the --prior of " + worst.name + ", or omit it"
-                                               : "do not hold " + worst.name + ": omit it from --fix";
+  std::string remedy = worst.sigma > 0.0 ? "correct the --prior of " + worst.name + ", or omit it"
+                                         : "do not hold " + worst.name + ": omit it from --fix";
+  if (worst.name.starts_with('f')) remedy += "; or was an autofocus left on?";  // a little of it looks the same
   const bool was_good = verdict.state == State::good;
   heed(check, remedy, verdict);
   if (!was_good) verdict.sentence += "; " + check.text;
-  verdict.to_add = remedy;  // what it explains goes with it
+  if (given.photos_agree) verdict.to_add = remedy;  // what it explains goes with it
 }
 
 }  // namespace alidade

@@ -67,8 +67,7 @@ void add_beam_assumptions(const Beam& beam, const Camera& camera, const std::vec
       const auto seen = project_with_jacobians(camera, one.point.point_in_cam);
       return std::pair{moved_m, seen ? Eigen::Vector2d(seen->J_px_point * moved_m) : Eigen::Vector2d(0.0, 0.0)};
     };
-    const std::optional<double> sigma =
-        beam.cov.isZero(0.0) ? std::nullopt : std::optional(std::sqrt(std::max(0.0, beam.cov(i, i))));
+    const auto sigma = beam.cov.isZero(0.0) ? std::nullopt : std::optional(std::sqrt(std::max(0.0, beam.cov(i, i))));
     assumed.push_back(assumption_of(names[static_cast<std::size_t>(i)], i < 3 ? beam.origin_in_cam[i] : 0.0, sigma,
                                     i < 3 ? ordinary_origin_m : ordinary_direction_rad, projected, moves));
   }
@@ -89,8 +88,7 @@ void add_camera_assumptions(const Camera& camera, const std::vector<ProjectedRea
       return std::pair{Eigen::Vector3d(0.0, 0.0, 0.0),
                        seen ? Eigen::Vector2d(error * seen->J_px_params.col(i)) : Eigen::Vector2d(0.0, 0.0)};
     };
-    const std::optional<double> sigma =
-        knows_covariance(camera) ? std::optional(std::sqrt(camera.cov(i, i))) : std::nullopt;
+    const auto sigma = knows_covariance(camera) ? std::optional(std::sqrt(camera.cov(i, i))) : std::nullopt;
     assumed.push_back(assumption_of(names[static_cast<std::size_t>(i)], lens[i], sigma,
                                     i < 2 ? ordinary_focal * lens[i] : ordinary_centre_px, projected, moves));
   }
@@ -133,26 +131,28 @@ Check image_check(const Camera& camera, const std::vector<ProjectedReading>& pro
     const bool is_behind = !(one.point.point_in_cam.z() > 0.0) && !one.pixel;
     const bool is_outside = !is_behind && !(one.pixel && is_in_image(camera, one.pixel->px));
     if (behind + outside == 0 && (is_behind || is_outside)) first_m = one.range_m;
-    behind += is_behind ? 1 : 0;
-    outside += is_outside ? 1 : 0;
+    (is_behind ? behind : outside) += is_behind || is_outside ? 1 : 0;
   }
   if (behind + outside == 0) return check;
   check.state = State::care;
   check.value = static_cast<double>(behind + outside);
-  const std::string where = behind > 0 ? "behind the camera" : "outside the image, where its lens is not calibrated";
-  check.text = fmt::format("{} of {} point{} {} {}, the first at {:g} m", behind > 0 ? behind : outside,
-                           projected.size(), projected.size() == 1 ? "" : "s",
-                           (behind > 0 ? behind : outside) == 1 ? "is" : "are", where, first_m);
+  const std::size_t num = behind > 0 ? behind : outside;
+  check.text =
+      fmt::format("{} of {} point{} {} {}, the first at {:g} m", num, projected.size(),
+                  projected.size() == 1 ? "" : "s", num == 1 ? "is" : "are",
+                  behind > 0 ? "behind the camera" : "outside the image, where its lens is not calibrated", first_m);
   return check;
 }
 
-/// Nearer than the beam enters the image nothing is wrong with it. `nearest_m`: of the readings.
-std::string remedy_of_image(const Beam& beam, const Camera& camera, double nearest_m) {
-  const std::string otherwise = "check origin, direction and camera of the beam";
-  for (double range_m = std::max(nearest_m, 1e-6); range_m < 100.0; range_m *= 1.02)  // of 5e-324 it would not grow
+/// Readings that are all nearer than where the beam enters the image are no fault of it.
+std::string remedy_of_image(const Beam& beam, const Camera& camera, const std::vector<ProjectedReading>& projected) {
+  double range_m = 1e-6;  // then the farthest one outside
+  for (const ProjectedReading& one : projected)
+    if (!(one.pixel && is_in_image(camera, one.pixel->px))) range_m = std::max(range_m, one.range_m);
+  for (; range_m < 100.0; range_m *= 1.02)
     if (const auto seen = measured_pixel(beam, camera, range_m); seen && is_in_image(camera, seen->px))
-      return range_m > nearest_m ? fmt::format("the beam is in the image from {:.2g} m on", range_m) : otherwise;
-  return otherwise;
+      return fmt::format("the beam is in the image from {:.2g} m on", range_m);
+  return "check origin, direction and camera of the beam";
 }
 
 /// The same for the heads of a rig.
@@ -345,7 +345,7 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
   heed(units_check(beam, ranges_m, config.sigma_range_m), "give lengths in metres: 2310 mm are --range 2.31",
        result.verdict);
   heed_other_camera(config, camera, result.verdict);
-  heed(image_check(camera, result.readings), remedy_of_image(beam, camera, std::ranges::min(ranges_m)), result.verdict);
+  heed(image_check(camera, result.readings), remedy_of_image(beam, camera, result.readings), result.verdict);
   heed(linear_check(beam, camera, result.readings), "use a beam that is better known, or a larger range",
        result.verdict);
   heed_assumptions(result.assumed, result.verdict);

@@ -89,6 +89,12 @@ TEST(ProjectFace, NearReadingsOutsideTheImageAreToldFromWhereTheBeamIsSeen) {
   aside.direction_in_cam = {0.97, 0.0, std::sqrt(1.0 - 0.97 * 0.97)};
   const BeamProjection far = project_readings(aside, wide_camera(), {2.0});
   EXPECT_NE(far.verdict.to_add.find("check origin"), std::string::npos) << far.verdict.to_add;
+  Beam crossing = beside_the_lens();  // it is left of the image first, and right of it far away
+  crossing.origin_in_cam.x() = -0.6;
+  crossing.direction_in_cam = {0.97, 0.0, std::sqrt(1.0 - 0.97 * 0.97)};
+  const BeamProjection both = project_readings(crossing, wide_camera(), {0.05, 5.0});
+  EXPECT_NE(both.verdict.to_add.find("check origin"), std::string::npos) << both.verdict.to_add;
+  EXPECT_FALSE(project_readings(crossing, wide_camera(), {5e-324}).verdict.to_add.empty());
 }
 
 TEST(ProjectFace, WhatIsNotSeenOrOfAnotherUnitIsNamed) {

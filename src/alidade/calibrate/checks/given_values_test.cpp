@@ -68,6 +68,17 @@ TEST(GivenValues, AHeldCentreThatThePhotosContradictIsNamedAndCounted) {
   }
 }
 
+/// True priors and a board that bends: that keeps its name and its advice.
+TEST(GivenValues, GoAfterWhatPhotosDisagreeOfWithoutThem) {
+  constexpr std::uint64_t seed = 1;
+  CalibrateConfig config;
+  config.priors = {{"fx", true_value("fx"), 0.3}, {"fy", true_value("fy"), 0.3}};
+  config.board_shape = BoardShape::flat;
+  const BoardScene bent = testing::covered_scene(testing::sample_camera("brown"), 20, seed, 0.004);
+  EXPECT_EQ(testing::sample_calibration(testing::sample_views(bent, seed), config).verdict.to_add,
+            "use --board-shape bow");
+}
+
 TEST(GivenValues, TruePriorsAreGood) {
   int good = 0;
   constexpr int sets = 8;
